@@ -3,7 +3,8 @@
 What a script needs is here; nothing is loaded before it is used:
 
 Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, Kept, ContactPair, Tie,
-    CyclicSymmetry, AutomaticContact, LoadStep, Preload, Section, ElasticFoundation, Spring, box_partition
+    CyclicSymmetry, AutomaticContact, LoadStep, Preload, Section, ElasticFoundation, Spring, LinearConstraint,
+    ConstraintTerm, box_partition
 
 Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, SlipTable, LinearClosure, ExponentialClosure,
     ClosureTable, ClosureLaw, FluidPressure
@@ -84,6 +85,8 @@ if TYPE_CHECKING:
     from fenics_contact._responses import SceneResponse as SceneResponse
     from fenics_contact._scene.automatic import AutomaticContact as AutomaticContact
     from fenics_contact._scene.body import Body as Body
+    from fenics_contact._scene.constraints import ConstraintTerm as ConstraintTerm
+    from fenics_contact._scene.constraints import LinearConstraint as LinearConstraint
     from fenics_contact._scene.fields import SampledField as SampledField
     from fenics_contact._scene.fields import Ufl as Ufl
     from fenics_contact._scene.fields import read_field as read_field

@@ -140,7 +140,8 @@ def with_requests(text: str, tight: bool) -> str:
     `tight`: whether iterations end at a hundred-thousandth of the forces in place of the program's 0.5 %, and
     linear systems are solved directly.
     """
-    plane = ",OUTPUT=2D" if _PLANE.search(text) else ""
+    # Without GLOBAL results of nodes with *TRANSFORM are along their axes.
+    plane = ",GLOBAL=YES,OUTPUT=2D" if _PLANE.search(text) else ",GLOBAL=YES"
     wanted = [f"*NODE FILE,FREQUENCY=99999{plane}", "U,RF"]
     if tight:
         wanted += ["*CONTROLS,PARAMETERS=FIELD", "1.E-5,1.E-5"]
@@ -150,6 +151,8 @@ def with_requests(text: str, tight: bool) -> str:
             lines += wanted
         if tight:
             line = re.sub(r", *SOLVER *= *ITERATIVE *(CHOLESKY|SCALING)", "", line, flags=re.IGNORECASE)
+        if re.match(r"\*NODE *PRINT", line, re.IGNORECASE) and "GLOBAL" not in line.upper():
+            line = f"{line.rstrip().rstrip(',')},GLOBAL=YES"
         lines.append(line)
     return "\n".join(lines) + "\n"
 

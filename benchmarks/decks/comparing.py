@@ -93,6 +93,8 @@ def _held(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
         number = tearing.body_names.index(body)
         part = slice(int(tearing.node_offset[number]), int(tearing.node_offset[number + 1]))
         own = forces.reaction[part] + (0.0 if heated else forces.load[part])
+        if forces.constraint is not None:
+            own = own + forces.constraint[part]
         for load in scene.loads if heated else ():
             if isinstance(load, PointForce) and load.body == body:
                 nodes = scene.bodies[body].mesh.nodes_of(load.nodes)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fenics_contact._base.display import displayed
+from fenics_contact._scene.constraints import require_refinable
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cuts import sewn
@@ -50,8 +51,8 @@ def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefineme
             keep their mesh. Quadratic quadrilaterals and hexahedra are refined all together.
 
     Raises:
-        InvalidInputError: If there is no such body, its cells cannot be refined, or one of its surfaces is
-            refined so that a new node lies off its shape.
+        InvalidInputError: If there is no such body, its cells cannot be refined, one of its surfaces is
+            refined so that a new node lies off its shape, or a linear constraint is by numbers of nodes.
     """
     unknown = sorted(set(marked) - set(scene.bodies))
     if unknown:
@@ -59,6 +60,7 @@ def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefineme
             f"marked must name bodies of the scene, {sorted(scene.bodies)}, got {unknown[0]!r}: take one "
             "of these"
         )
+    require_refinable(scene.constraints, scene.bodies)
     bodies, refinements = dict(scene.bodies), {}
     for name, cells in marked.items():
         mesh = sewn(bodies[name].mesh)

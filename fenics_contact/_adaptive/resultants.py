@@ -134,6 +134,10 @@ def _of_ties(torn: TornSystem, held: np.ndarray) -> np.ndarray:
         position = torn.numbering.owned_index(torn.n_gluing + np.arange(rows.count))
         acting = np.where(rows.held(torn.decomposition.fixed), 0.0, work)
         result[position[position >= 0]] = acting[position >= 0]
+    if torn.constraints is not None:
+        work = torn.constraints.whole @ held.ravel()
+        position = torn.numbering.owned_index(torn.after_ties + np.arange(len(work)))
+        result[position[position >= 0]] = work[position >= 0]
     return result
 
 

@@ -286,6 +286,9 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     for name, spring in state.springs().items() if state.scene.springs else ():
         size, longer = np.linalg.norm(spring.force), np.linalg.norm(spring.elongation)
         rows[f"spring {name}"] = f"{size:.6g} {force}, ends moved by {longer:.6g} {units.length}"
+    for name, held in state.constraints().items() if state.scene.constraints else ():
+        on = (f"{np.linalg.norm(total):.6g} {force} on {body}" for body, total in held.on_bodies.items())
+        rows[f"constraint {name}"] = ", ".join(on)
     if state.unheld:
         rows["held by nothing"] = " and ".join(map(str, state.unheld)) + ": stays where it is"
     if state.known_errors is not None:

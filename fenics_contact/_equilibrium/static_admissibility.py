@@ -138,6 +138,7 @@ def _along_sections(torn: TornSystem) -> tuple[sp.csr_matrix, np.ndarray]:
     bonded = ~are_sliding(scene.ties, ties.pair[: ties.count - len(scene.springs)])
     place = np.cumsum(bonded) - 1
     sprung = 0 if torn.springs is None else torn.springs.count
+    constrained = 0 if torn.constraints is None else torn.constraints.count
     columns, forces = [], []
     for number, preload in enumerate(scene.preloads):
         if not preload.is_free:
@@ -146,7 +147,7 @@ def _along_sections(torn: TornSystem) -> tuple[sp.csr_matrix, np.ndarray]:
         row = place[mine][:, None] * torn.components + np.arange(torn.components)
         size = np.sqrt(len(mine))
         entries = (ties.normal[mine].ravel() / size, (row.ravel(), np.zeros(row.size, dtype=np.int64)))
-        count = torn.components * int(bonded.sum()) + int((~bonded).sum()) + sprung
+        count = torn.components * int(bonded.sum()) + int((~bonded).sum()) + sprung + constrained
         columns.append(sp.csr_matrix(entries, shape=(count, 1)))
         forces.append(-(preload.force or 0.0) / size)
     return sp.hstack(columns, format="csr"), np.array(forces)
@@ -193,7 +194,7 @@ class RigidBody:
         return sp.csr_matrix(np.hstack([normal, slip.reshape(len(normal), -1)]))
 
     def tie_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
-        """Wrenches of unit forces at tied points, and of springs at the end, shape (n_modes, n)."""
+        """Wrenches of unit forces at tied points, then of springs and constraints, shape (n_modes, n)."""
         count = torn.ties.count - len(torn.scene.springs)
         arms, sprung = np.split(self.arms(torn.ties), [count])
         sliding = are_sliding(torn.scene.ties, torn.ties.pair[:count])
@@ -202,6 +203,10 @@ class RigidBody:
         every = [bonded, gliding]
         if torn.springs is not None:
             every.append(np.einsum("rd,rdm->mr", torn.springs.directions, sprung[torn.springs.spring]))
+        if torn.constraints is not None:
+            own = slice(self._nodes.start * torn.components, self._nodes.stop * torn.components)
+            modes = self._modes.reshape(-1, self._modes.shape[2])
+            every.append(np.asarray(torn.constraints.whole[:, own] @ modes).T)
         return sp.csr_matrix(np.hstack(every))
 
     def load_wrench(self, torn: TornSystem) -> np.ndarray:

@@ -273,7 +273,7 @@ def tracked_motions(turned: Sequence[TurnedSurface], torn: TornSystem) -> FreeMo
         affine = np.einsum("na,bc->ncab", each.arms[:, :dim], np.eye(dim))
         fields.append(_on_rows(each, affine.reshape(dim * len(affine), dim * dim), size))
     load, nodes = np.concatenate(loads), sp.hstack(fields, format="csr")
-    rows = FreeMotions(nodes, np.zeros(nodes.shape[1])).of_rows(decomposition.gluing.dof, torn.relations)
+    rows = FreeMotions(nodes, np.zeros(nodes.shape[1])).of_rows(decomposition.gluing.dof, torn.measured)
     rows, count = rows[torn.numbering.owned], len(load)
     columns = sp.hstack([rows[:, :count], torn.free.columns], format="csr")
     load = np.concatenate([load, torn.free.load])

@@ -169,6 +169,7 @@ def sections(record: Record, units: Units) -> str:
         "Load steps": _steps(record, units),
         "Rigid surfaces": _rows(_motions(record, units)),
         "Springs": _rows(_springs(record, units)),
+        "Linear constraints": _rows(_constraints(record, units)),
         "Forces and moments": _forces(record, units),
         "Errors and residuals": _rows(_accuracy(record)),
         "Computed with": _rows(_origin(record)),
@@ -339,6 +340,16 @@ def _springs(record: Record, units: Units) -> dict[str, str]:
         tension, longer = (", ".join(map(number, entry[name])) for name in ("tension", "elongation"))
         force, _ = _force_units(record, units)
         facts[entry["name"]] = f"tension {tension} {force}; elongation {longer} {units.length}"
+    return facts
+
+
+def _constraints(record: Record, units: Units) -> dict[str, str]:
+    """Return the forces of linear constraints on bodies."""
+    facts: dict[str, str] = {}
+    for entry in (record.get("forces") or {}).get("constraints") or ():
+        force, _ = _force_units(record, units)
+        on = [f"{each['body']} {', '.join(map(number, each['force']))} {force}" for each in entry["bodies"]]
+        facts[entry["name"]] = f"{entry['equations']} equations; force on {'; '.join(on)}"
     return facts
 
 

@@ -26,7 +26,7 @@ def on_masters(points: ContactPoints, scene: Scene, body: str, means: bool) -> C
 
     `body`: that of the slave; `means`: whether points have rows by the dual basis, not by nodes.
     """
-    followed = _followed(scene)
+    followed = followed_nodes(scene)
     points = replace(points, master=(points.master @ followed).tocsr())
     hanging, numbers = scene.bodies[body].mesh.hanging, NodeNumbers.of(scene)
     if hanging is None:
@@ -64,7 +64,7 @@ def on_masters(points: ContactPoints, scene: Scene, body: str, means: bool) -> C
 
 def means_on_masters(points: ContactPoints, scene: Scene) -> ContactPoints:
     """Return points that are means over surfaces, in terms of the nodes that do not hang."""
-    return replace(points, master=(points.own - points.jump @ _followed(scene)).tocsr())
+    return replace(points, master=(points.own - points.jump @ followed_nodes(scene)).tocsr())
 
 
 def _shares(leaving: np.ndarray, there: np.ndarray, count: int) -> sp.csr_matrix:
@@ -79,7 +79,7 @@ def _shares(leaving: np.ndarray, there: np.ndarray, count: int) -> sp.csr_matrix
     return (sp.identity(count) + taken).tocsr()
 
 
-def _followed(scene: Scene) -> sp.csr_matrix:
+def followed_nodes(scene: Scene) -> sp.csr_matrix:
     """Return T on the nodes of all bodies, dependent ones by their masters'."""
     meshes = [body.mesh for body in scene.bodies.values()]
     parts = [

@@ -558,7 +558,7 @@ def _moved_by_supports(scene: SceneParts, name: str) -> np.ndarray:
 
 
 def _named(scene: SceneParts, both: tuple[str, str]) -> dict[str, np.ndarray]:
-    """Return for each of two bodies its nodes on surfaces of the pairs and ties between them."""
+    """Return for each of two bodies its nodes of pairs, ties and constraints between them."""
     nodes: dict[str, list[np.ndarray]] = {name: [] for name in both}
     pairs: list[ContactPair | AnyTie] = [*scene.contacts, *scene.ties]
     for pair in pairs:
@@ -566,6 +566,11 @@ def _named(scene: SceneParts, both: tuple[str, str]) -> dict[str, np.ndarray]:
         if {side.body for side in sides} == set(both):
             for side in sides:
                 nodes[side.body].append(np.unique(scene.bodies[side.body].mesh.surfaces[side.name]))
+    for constraint in scene.constraints:
+        terms = [term for term in constraint.terms if term.body in both]
+        if {term.body for term in terms} == set(both):
+            for term in terms:
+                nodes[term.body].append(term.nodes_of(scene.bodies[term.body].mesh))
     return {name: np.concatenate([*found, np.zeros(0, dtype=np.int64)]) for name, found in nodes.items()}
 
 

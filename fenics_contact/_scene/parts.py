@@ -12,6 +12,7 @@ import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.constraints import LinearConstraint
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.initial_stress import require_components
 from fenics_contact._scene.loads import (
@@ -49,8 +50,7 @@ from fenics_contact.mesh.faces import vector_areas
 if TYPE_CHECKING:
     from fenics_contact._surfaces.continued import Neighbour
 
-
-_ON_NODES = ("Support", "Roller", "PointForce", "Spring.first", "Spring.second")
+_ON_NODES = ("Support", "Roller", "RigidSurface", "PointForce", "Spring.first", "Spring.second")
 """What may act on the nodes of a node set."""
 
 
@@ -67,6 +67,7 @@ class SceneParts:
     preloads: Sequence[Preload] = field(default=())
     foundations: Sequence[ElasticFoundation] = field(default=())
     springs: Sequence[Spring] = field(default=())
+    constraints: Sequence[LinearConstraint] = field(default=())
 
     def __post_init__(self) -> None:
         """Reject names that do not exist, and loads and supports that do not suit their bodies."""

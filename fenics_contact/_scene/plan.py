@@ -41,6 +41,7 @@ class EffectName(StrEnum):
     RIGID_SURFACE = "rigid surface"
     FOUNDATION = "elastic foundation"
     SPRING = "spring"
+    LINEAR_CONSTRAINT = "linear constraint"
     RIGID_TOOL = "rigid tool"
     BODY_FORCE = "body force"
     SURFACE_LOAD = "surface load"
@@ -99,6 +100,8 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.RIGID_SURFACE, rigid, "surface stays rigid", "surfaces stay rigid"),
         (names.FOUNDATION, len(scene.foundations), "surface rests on springs", "surfaces rest on springs"),
         (names.SPRING, len(scene.springs), "spring acts between surfaces", "springs act between surfaces"),
+        (names.LINEAR_CONSTRAINT, len(scene.constraints), "set of equations between displacements of nodes",
+         "sets of equations between displacements of nodes"),
         (names.RIGID_TOOL, tools, "tool moves as one piece", "tools move as one piece each"),
         (names.BODY_FORCE, volume, "load on a volume", "loads on volumes"),
         (names.SURFACE_LOAD, len(loads) - volume - thermal - single, "load on a surface",
@@ -154,7 +157,7 @@ def point_loads(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarray:
 
 def _of_point(surface: RigidSurface, mesh: BodyMesh, modes: np.ndarray) -> np.ndarray:
     """Return displacement and rotation of the point for motions of its body, (n_components, n_modes)."""
-    nodes = np.unique(mesh.surfaces[surface.surface])
+    nodes = mesh.nodes_of(surface.surface)
     moved = surface.modes(mesh.points[nodes]).reshape(-1, len(surface.motion))
     size = np.linalg.norm(moved, axis=0)
     fitted = np.linalg.lstsq(moved / size, modes[nodes].reshape(len(moved), -1), rcond=None)[0]
@@ -325,7 +328,7 @@ def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = Fal
         return SolverKind.FACE_NEWTON
     # A body that its supports alone do not hold has a singular stiffness; ties need multipliers.
     loose = any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports)
-    loose = loose or bool(scene.preloads or scene.ties or scene.springs)
+    loose = loose or bool(scene.preloads or scene.ties or scene.springs or scene.constraints)
     if subdomains == 1 and not (sensitivity or loose) and held_by_supports(scene, scene.body_names[0]):
         return SolverKind.DIRECT
     return SolverKind.PROJECTED_CG
@@ -351,6 +354,7 @@ def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
         "tied": sum(tied),
         "drawn": sum(scene.components * each.count(scene.bodies[each.body].mesh) for each in scene.preloads),
         "sprung": sum(len(each.rows(scene)[1]) for each in scene.springs),
+        "constrained": sum(each.count(scene.bodies) for each in scene.constraints),
         "normal": sum(slaves),
         "tangential": (scene.components - 1) * sum(rubbing),
     }

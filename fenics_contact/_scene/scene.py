@@ -11,6 +11,7 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.automatic import AutomaticContact
+from fenics_contact._scene.constraints import require_terms, with_values
 from fenics_contact._scene.contact_facets import with_free_centres
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.pairs import ContactPair, with_pressures
@@ -43,6 +44,7 @@ class Scene(SceneParts):
             whose nodes are there twice; cells and surfaces keep numbers and names.
         foundations: Surfaces that rest on springs to the ground, the same in all load steps.
         springs: Springs between surfaces, the same in all load steps.
+        constraints: Linear equations between displacements of nodes; load steps may change their values.
 
     Raises:
         InvalidInputError: If a part names a body or a surface that is not there, does not suit the body's
@@ -75,6 +77,7 @@ class Scene(SceneParts):
         if self.preloads:
             object.__setattr__(self, "bodies", with_cuts(self))
         require_preloads(self)
+        require_terms(self.constraints, self.bodies)
         if any(body.mesh.centres is not None for body in self.bodies.values()):
             object.__setattr__(self, "bodies", with_free_centres(self))
         object.__setattr__(self, "contacts", with_discretisation(self, self.contacts))
@@ -118,6 +121,7 @@ class Scene(SceneParts):
             "ties": [tie.place for tie in self.ties],
             **({"foundations": [each.place for each in self.foundations]} if self.foundations else {}),
             **({"springs": [spring.place for spring in self.springs]} if self.springs else {}),
+            **({"constraints": [each.place for each in self.constraints]} if self.constraints else {}),
             **({"preloads": [preload.place for preload in self.preloads]} if self.preloads else {}),
         }
 
@@ -188,6 +192,8 @@ class LoadStep:
         contacts: The contact pairs of the step, such as those of the scene with other laws of friction or
             closure, by ``replace(pair, friction=Coulomb(0.1))``; pairs that are left out do not act. None: as
             they were.
+        constraints: Values of linear constraints at the end of the step by their names; others keep theirs.
+            None: all do.
 
     Raises:
         InvalidInputError: If there are functions of time, and no time, or it is not finite.
@@ -205,6 +211,7 @@ class LoadStep:
     preloads: Sequence[Preload] | None = None
     fluids: Mapping[str, float] | None = None
     contacts: Sequence[ContactPair] | None = None
+    constraints: Mapping[str, float | Sequence[float]] | None = None
 
     def __post_init__(self) -> None:
         """Raise if loads are functions of time and no finite time is given."""
@@ -224,7 +231,7 @@ class LoadStep:
 
         Raises:
             InvalidInputError: If a function of time returns no loads or supports, or the scene has no such
-                preload or fluid.
+                preload, fluid or constraint.
             UserCodeError: If it raises.
         """
         loads = scene.loads if self.loads is None else self.loads
@@ -236,6 +243,8 @@ class LoadStep:
             scene = replace(scene, preloads=changed_by(scene, self.preloads))
         if self.fluids is not None:
             scene = replace(scene, contacts=with_pressures(scene.contacts, self.fluids))
+        if self.constraints is not None:
+            scene = replace(scene, constraints=with_values(scene.constraints, self.constraints))
         return self._with(scene, loads, supports, end)
 
     def at(self, scene: Scene, time: float) -> Scene:

@@ -189,7 +189,7 @@ class RigidSurface:
 
     Attributes:
         body: Name of the body.
-        surface: Name of its surface.
+        surface: Name of its surface, or a node set.
         at: The point p, which need not belong to the body, [length].
         displacement: U, [length]: for each direction a number, or None where it is free; all free by default.
         rotation: θ about each axis, in the plane one number, positive from x to y, of bodies of revolution

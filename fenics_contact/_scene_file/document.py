@@ -23,6 +23,7 @@ from fenics_contact._scene_file.model import (
     AnySupportPart,
     AnyTiePart,
     AutomaticPart,
+    ConstraintPart,
     ContactPart,
     FoundationPart,
     PreloadAim,
@@ -42,6 +43,7 @@ from fenics_contact._scene_file.values import (
     at_time,
     between,
     changes,
+    either,
     is_reference,
     with_message,
 )
@@ -224,6 +226,9 @@ class StepPart(Part):
     fluids: dict[str, NonNegativeFloat] = Field(
         {}, description="name of a fluid in contacts -> its pressure at the end, [force/length²]"
     )
+    constraints: dict[str, either(list, list[float], float)] = Field(  # type: ignore[valid-type]
+        {}, description="name of equations in [[constraints]] -> their value at the end, [length]"
+    )
 
     def drawn(self, preloads: Sequence[PreloadPart]) -> tuple[Preload, ...] | None:
         """Return the preloads that the step draws together, None where all stay as they were."""
@@ -242,6 +247,7 @@ def load_steps(
     loads: Sequence[AnyLoad],
     preloads: Sequence[PreloadPart],
     fluids: Mapping[str, float],
+    constraints: Mapping[str, Any],
     bodies: Mapping[str, Body],
     at: Callable[..., AbstractContextManager[None]],
 ) -> tuple[LoadStep, ...]:
@@ -250,7 +256,8 @@ def load_steps(
     A support or load that a step does not name keeps its value; a named one changes linearly from the value
     before, initially its own, to the one given. A formula that depends on t is evaluated at the end of each
     load step instead, also in later steps and where it is the initial value; t starts at zero. Preloads have
-    their aims in all of the step's parts; pressures of fluids change linearly.
+    their aims in all of the step's parts; pressures of fluids and values of equations
+    change linearly.
     """
     with at("steps"):
         _require_few(steps)
@@ -260,7 +267,7 @@ def load_steps(
     own = [(0.0,) * first.components if part.size is None else part.size for part in supports]
     held = _Values([part.name for part in supports], own)
     acting = _Values([part.name for part in loads], [part.size for part in loads])
-    wetting = dict(fluids)
+    wetting, equal = dict(fluids), dict(constraints)
     built: list[LoadStep] = []
     begin = 0.0
     for position, step in enumerate(steps):
@@ -277,13 +284,20 @@ def load_steps(
                 pressures = {
                     each: wetting[each] + share * (end - wetting[each]) for each, end in step.fluids.items()
                 }
+                values = {
+                    each: ((1.0 - share) * np.asarray(equal[each]) + share * np.asarray(end)).tolist()
+                    for each, end in step.constraints.items()
+                }
                 drawn = step.drawn(preloads)
-                built.append(LoadStep(name, acts, holds, time, drawn, pressures or None))
+                built.append(
+                    LoadStep(name, acts, holds, time, drawn, pressures or None, constraints=values or None)
+                )
             for part in (*acted.at(time, 1.0), *held_up.at(time, 1.0)):
                 check_formulas(part, bodies)
         held.reach(step.supports)
         acting.reach(step.loads)
         wetting.update(step.fluids)
+        equal.update(step.constraints)
         begin += duration
     return tuple(built)
 
@@ -448,6 +462,7 @@ class Document(Part):
     preloads: list[PreloadPart] = Field([], description="bolts drawn together at a section")
     foundations: list[FoundationPart] = Field([], description="surfaces on springs to the ground")
     springs: list[SpringPart] = Field([], description="springs between surfaces")
+    constraints: list[ConstraintPart] = Field([], description="equations between displacements of nodes")
     steps: list[StepPart] = Field([], description="load steps; without them all acts at once")
     solver: SolverPart = Field(SolverPart(), description="how it is solved")
     accuracy: AccuracyPart | None = Field(

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from fenics_contact._base.checks import meaning
 from fenics_contact._scene import automatic, loads, pairs, surface_laws
 from fenics_contact._scene import obstacles as obstacles_module
+from fenics_contact._scene.constraints import ConstraintTerm, LinearConstraint
 from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import Load
@@ -473,6 +474,39 @@ class SpringPart(Part):
             )
         second: Any = self.point if self.second is None else self.second.made()
         return super().made(second=second, name=self.name or "")
+
+
+@keys_of(ConstraintTerm)
+class TermPart(Part):
+    """A term of equations between displacements of nodes."""
+
+    nodes: either(list, list[int], str) = Field(  # type: ignore[valid-type]
+        description="a node set or a surface, or numbers of nodes"
+    )
+    direction: either(  # type: ignore[valid-type]
+        str, Literal["x", "y", "z"], either(list, list[float] | list[list[float]], str)
+    ) = Field(description='"x", "y" or "z", a vector of any length, or a list with one for each node')
+    factor: either(list, list[float], float) = Field(  # type: ignore[valid-type]
+        1.0, description="by which it is multiplied, or one for each node"
+    )
+    equation: either(list, list[int], int | None) = Field(  # type: ignore[valid-type]
+        None, description="number of the equation of all nodes, from 0, or of each; by default one a node"
+    )
+
+
+@keys_of(LinearConstraint, without=("name", "terms"))
+class ConstraintPart(Part):
+    """Equations between displacements of nodes."""
+
+    terms: list[TermPart] = Field(min_length=1, description="what is added")
+    value: either(list, list[float], float) = Field(  # type: ignore[valid-type]
+        0.0, description="what the sum is, or that of each equation, [length]"
+    )
+    name: str | None = Field(None, description="how load steps and results call it, the terms by default")
+
+    def made(self, **other: Any) -> LinearConstraint:
+        """Build the constraint."""
+        return super().made(terms=[term.made() for term in self.terms], name=self.name or "")
 
 
 @keys_of(Preload, without=("section", "name"))

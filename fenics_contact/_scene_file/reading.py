@@ -43,7 +43,7 @@ from fenics_contact._scene_file.design import (
     objective_of,
 )
 from fenics_contact._scene_file.document import Document, load_steps, refused_python
-from fenics_contact._scene_file.model import RollerPart, SupportPart, TriangulationPart
+from fenics_contact._scene_file.model import RigidPart, RollerPart, SupportPart, TriangulationPart
 from fenics_contact._scene_file.source import (
     Mistake,
     SceneFileError,
@@ -131,7 +131,16 @@ class Builder:
         document, dim = self._document, next(iter(bodies.values())).mesh.dim
         empty = Scene(bodies)
         built: dict[str, list[Any]] = {}
-        for key in ("contacts", "supports", "loads", "ties", "preloads", "foundations", "springs"):
+        for key in (
+            "contacts",
+            "supports",
+            "loads",
+            "ties",
+            "preloads",
+            "foundations",
+            "springs",
+            "constraints",
+        ):
             built[key] = []
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):
@@ -168,7 +177,7 @@ class Builder:
     def _check_surfaces(self, bodies: Mapping[str, Body]) -> None:
         for path, part in surface_parts(self._document):
             mesh = bodies[part.body].mesh
-            on_nodes = isinstance(part, SupportPart | RollerPart) or path[0] == "springs"
+            on_nodes = isinstance(part, SupportPart | RollerPart | RigidPart) or path[0] == "springs"
             known = {**mesh.surfaces, **mesh.node_sets} if on_nodes else mesh.surfaces
             if part.surface not in known:
                 what, where = f"a surface of the body {part.body!r}", (*path, "surface")
@@ -463,7 +472,8 @@ class SceneFile:
         document, bodies = self._complete, self.scene.bodies
         parts = document.supports, document.loads, document.preloads
         fluids = pressures_of(self.scene.contacts)
-        return load_steps(document.steps, *parts, fluids, bodies, self._at)
+        values = {each.label: each.value for each in self.scene.constraints}
+        return load_steps(document.steps, *parts, fluids, values, bodies, self._at)
 
     @cached_property
     def partitions(self) -> dict[str, np.ndarray]:

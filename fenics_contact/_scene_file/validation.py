@@ -45,6 +45,7 @@ def wrong_names(source: Source, document: Document) -> list[Mistake]:
         "the name of a support": _names(document.supports),
         "the name of a load": _names(document.loads),
         "the name of a preload": _names(document.preloads),
+        "the name of a constraint": _names(document.constraints),
         "the name of a fluid": _names(part.fluid for part in document.contacts if part.fluid),
     }
     used = _references(document)
@@ -102,7 +103,7 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
     for number, step in enumerate(document.steps):
         changed: dict[str, Iterable[str]] = {
             "supports": step.supports, "loads": step.loads, "preloads": step.preloads or (),
-            "fluids": step.fluids,
+            "fluids": step.fluids, "constraints": step.constraints,
         }  # fmt: skip
         for key, named in changed.items():
             for name in named:
@@ -132,7 +133,7 @@ def _wrong_pairs(source: Source, document: Document) -> Iterator[Mistake]:
 
 
 def _twice(source: Source, document: Document) -> Iterator[Mistake]:
-    for key in ("supports", "loads", "preloads"):
+    for key in ("supports", "loads", "preloads", "constraints"):
         seen: set[str] = set()
         for number, part in enumerate(getattr(document, key)):
             if part.name in seen:

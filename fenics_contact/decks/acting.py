@@ -122,10 +122,11 @@ class Acting:
             for body, mesh in self.model.parts.meshes.items():
                 mine, inner = self.model.in_body(body, self.model.node_sets[name])
                 if len(mine):
-                    each = moment.forces[mine, : self.model.dim] / self.model.thickness
+                    owned = self.model.owned(body, mine)
+                    each = moment.forces[mine, : self.model.dim] / self.model.thickness * owned[:, None]
                     value: Any = (
                         tuple((force / self.model.thickness).tolist())
-                        if force is not None
+                        if force is not None and owned.all()
                         else NodeValues(mesh.points[inner], each)
                     )
                     found.append(PointForce(body, name, value))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 
 from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie
+from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.surface_laws import ClosureLaw, ClosureTable, ExponentialClosure, LinearClosure
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -34,11 +35,48 @@ class Interaction:
 
 
 @dataclass(frozen=True)
+class Around:
+    """An axis around which a sector repeats, and how often."""
+
+    card: Card
+    point: tuple[float, ...]
+    axis: tuple[float, ...]
+    count: float
+
+    @classmethod
+    def of(cls, tie: Card, cards: Sequence[Card]) -> Around:
+        """Return that of a tie of both sides of a sector."""
+        name = tie.name_of("NAME")
+        models = [card for card in cards if card.name == "CYCLICSYMMETRYMODEL"]
+        found = [card for card in models if card.name_of("TIE") == name or len(models) == 1]
+        if not found:
+            raise tie.error(f"needs a *CYCLIC SYMMETRY MODEL with TIE={name}: add it, with N= and the axis")
+        numbers = found[0].floats(0) if found[0].lines else []
+        count = found[0].number_of("N")
+        if len(numbers) < 6 or count < 2:
+            raise found[0].error("needs N= sectors and a line with two points of the axis: complete it")
+        first, second = np.array(numbers[:3]), np.array(numbers[3:6])
+        return cls(found[0], tuple(first.tolist()), tuple((second - first).tolist()), count)
+
+    def tie(self, slave: Surface, master: Surface, meshes: Mapping[str, BodyMesh]) -> CyclicSymmetry:
+        """Return the symmetry of a sector of 360°/N, in the sense that is measured between its sides."""
+        made = CyclicSymmetry(slave, master, self.point, self.axis)
+        angle = made.measured_angle(meshes[slave.body], meshes[master.body])
+        if abs(2.0 * np.pi / abs(angle) - self.count) > 0.5:
+            raise self.card.error(
+                f"N={self.count:g} sectors are 360°/N apart, but {master.in_words} is "
+                f"{abs(np.degrees(angle)):.6g}° from {slave.in_words}: correct N, the axis or the surfaces"
+            )
+        return replace(made, angle=angle)
+
+
+@dataclass(frozen=True)
 class Sides:
     """Two surfaces by name, and the card that names them.
 
     Attributes:
         tied: Whether they stay together.
+        around: The axis of a sector, of which they are both sides.
     """
 
     slave: str
@@ -46,6 +84,7 @@ class Sides:
     card: Card
     row: int
     tied: bool
+    around: Around | None = None
 
 
 def read_interactions(cards: Sequence[Card]) -> dict[str, Interaction]:
@@ -84,10 +123,12 @@ def read_sides(cards: Sequence[Card], known: Mapping[str, Interaction]) -> list[
         if card.name not in ("CONTACTPAIR", "TIE"):
             continue
         tied = card.name == "TIE" or interaction_of(card, known).tied
+        around = Around.of(card, cards) if "CYCLICSYMMETRY" in card.parameters else None
         for row, entries in enumerate(card.rows):
             if len(entries) != 2:
                 raise card.error("needs a slave and a master surface in each line: complete it", row)
-            found.append(Sides(entries[0].upper().strip('"'), entries[1].upper().strip('"'), card, row, tied))
+            slave, master = (entry.upper().strip('"') for entry in entries)
+            found.append(Sides(slave, master, card, row, tied, around))
     return found
 
 
@@ -177,13 +218,13 @@ def build_pairs(
     given: Mapping[tuple[str, str], tuple[Card, float]],
     alone: Mapping[str, str],
     note: Note,
-) -> list[tuple[Sides, ContactPair | Tie]]:
+) -> list[tuple[Sides, ContactPair | AnyTie]]:
     """Return contact pairs and ties between bodies.
 
     `names`: name of a surface in the deck -> that in the meshes; `alone`: name of a slave whose nodes touch
     one by one -> that of the node set in the meshes.
     """
-    found: list[tuple[Sides, ContactPair | Tie]] = []
+    found: list[tuple[Sides, ContactPair | AnyTie]] = []
     for both, (card, _) in given.items():
         if both not in {(each.slave, each.master) for each in sides if not each.tied}:
             raise card.error(f"there is no contact pair of {both[0]} on {both[1]}: correct the names")
@@ -202,11 +243,13 @@ def build_pairs(
                 note(each.card, f"the pair {each.slave} on {each.master} is the one in the other sense, once")
                 continue
             try:
-                made: ContactPair | Tie = (
-                    Tie(one, other)
-                    if each.tied
-                    else _pair(one, other, each, interactions, given, alone, note)
-                )
+                made: ContactPair | AnyTie
+                if each.around is not None:
+                    made = each.around.tie(one, other, meshes)
+                elif each.tied:
+                    made = Tie(one, other)
+                else:
+                    made = _pair(one, other, each, interactions, given, alone, note)
             except InvalidInputError as error:
                 if getattr(error, "card", ""):
                     raise

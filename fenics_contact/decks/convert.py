@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from fenics_contact._scene.constraints import LinearConstraint
 from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.loads import (
     BodyForce,
@@ -25,7 +26,7 @@ from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.preloads import Section as CutAt
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.springs import Spring
+from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Roller, Support
 from fenics_contact._scene.surface_laws import ClosureTable, ExponentialClosure, LinearClosure
 from fenics_contact.decks.deck import Deck
@@ -132,9 +133,9 @@ class _Writer:
         if alone:
             document["loads"] = [self._load(each, f"load {k}") for k, each in enumerate(scene.loads)]
         document["contacts"] = [_pair(pair) for pair in scene.contacts]
-        document["ties"] = [{"slave": _side(tie.slave), "master": _side(tie.master)} for tie in scene.ties]
+        document["ties"] = [_tie(tie) for tie in scene.ties]
         document["preloads"] = [_preload(each) for each in scene.preloads]
-        document["springs"] = [_spring(each) for each in scene.springs]
+        document["constraints"] = [_constraint(each) for each in scene.constraints]
         if not alone:
             document["loads"], document["steps"] = self._history(steps)
         return {key: value for key, value in document.items() if value not in ([], {})}
@@ -263,6 +264,8 @@ class _Writer:
                 table["preloads"] = {
                     each.label: _given(each, "force", "shortening") for each in step.preloads
                 }
+            if step.constraints is not None:
+                table["constraints"] = {name: _plain(value) for name, value in step.constraints.items()}
             tables.append(table)
             begin = end
         loads = [{"name": name, **table, _changed(table): _nothing(table)} for name, table in named.values()]
@@ -333,6 +336,13 @@ def _side(surface: Surface) -> dict[str, str]:
     return {"body": surface.body, "surface": surface.name}
 
 
+def _tie(tie: AnyTie) -> dict[str, Any]:
+    table: dict[str, Any] = {"slave": _side(tie.slave), "master": _side(tie.master)}
+    if isinstance(tie, CyclicSymmetry):
+        table |= {"kind": "cyclic", "at": list(tie.at), "axis": list(tie.axis or ()), "angle": tie.angle}
+    return table
+
+
 def _pair(pair: ContactPair) -> dict[str, Any]:
     assert isinstance(pair.master, Surface)
     table: dict[str, Any] = {"slave": _side(pair.slave), "master": _side(pair.master)}
@@ -362,19 +372,21 @@ def _preload(preload: Preload) -> dict[str, Any]:
     return table
 
 
-def _spring(spring: Spring) -> dict[str, Any]:
-    assert isinstance(spring.second, Surface)
-    stiffness: Any = spring.stiffness
-    if np.isinf(stiffness).any():
-        raise InvalidInputError(
-            f"a scene file has no springs of infinite stiffness, as {spring.label!r}, an equation of the "
-            "deck: run the deck, or read it in Python"
-        )
-    return {
-        "first": _side(spring.first),
-        "second": _side(spring.second),
-        "stiffness": list(stiffness) if isinstance(stiffness, tuple) else stiffness,
-    }
+def _constraint(constraint: LinearConstraint) -> dict[str, Any]:
+    terms = [
+        {
+            "body": term.body,
+            **{name: _plain(value) for name in ("nodes", "direction", "factor", "equation")
+               if (value := getattr(term, name)) is not None},
+        }
+        for term in constraint.terms
+    ]  # fmt: skip
+    return {"name": constraint.label, "terms": terms, "value": _plain(constraint.value)}
+
+
+def _plain(value: Any) -> Any:
+    """Return arrays and tuples as lists."""
+    return value.tolist() if isinstance(value, np.ndarray) else _listed(value)
 
 
 def _listed(value: Any) -> Any:

@@ -14,10 +14,11 @@ from fenics_contact._base.display import displayed
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import LoadSequence
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.pairs import ContactPair, Tie
+from fenics_contact._scene.constraints import LinearConstraint
+from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.springs import Spring
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import AnySupport, Roller
 from fenics_contact.decks.acting import Acting
 from fenics_contact.decks.contact import (
@@ -148,9 +149,10 @@ def read_deck(path: str | Path, comm: MPI.Comm | None = None, *, statics_only: b
     """Read a deck of CalculiX or Abaqus: its mesh, materials, supports, contact, loads and steps.
 
     Every card is read or is known to have no effect on what is solved; all else is refused with its line.
-    Bodies are elements that share nodes, named by their element sets; their regions are the sections. Names
-    are in capitals, as both programs read them. A set of nodes that are all nodes of some faces is a surface,
-    another one a set of nodes of the mesh.
+    Bodies are elements that share faces, named by their element sets; their regions are the sections. Bodies
+    that share nodes alone are joined there by a linear constraint. Names are in capitals, as both programs
+    read them. A set of nodes that are all nodes of some faces is a surface, another one a set of nodes of the
+    mesh.
 
     Args:
         path: The file, mostly ``.inp``; files that it includes are looked for in its folder.
@@ -247,9 +249,9 @@ class _Builder:
         bodies = model.bodies()
         preloads = self.holding.preloads()
         supports = self.holding.supports(supported, None)
-        rollers, springs = self.holding.equations()
+        rollers, constraints = self.holding.equations()
         supports = (*supports, *rollers)
-        scene = self._scene(bodies, supports, *self._pairs(sides), preloads, springs)
+        scene = self._scene(bodies, supports, *self._pairs(sides), preloads, constraints)
         steps, step_of = self._steps(scene, bodies, supported, loaded, preloads, rollers)
         mesh = model.mesh
         return Deck(
@@ -294,8 +296,12 @@ class _Builder:
                     aims = [drawn(bolt, held, moment, before) for bolt, held in pairs]
                     acting = [aim for aim in aims if aim is not None]
                 contacts = self._contacts_of(number, scene)
+                values = self.holding.equation_values(moment) if self.model.equations else None
+                name = f"{step.name}{part}"
                 steps.append(
-                    LoadStep(f"{step.name}{part}", loads, supports, moment.time, acting, contacts=contacts)
+                    LoadStep(
+                        name, loads, supports, moment.time, acting, contacts=contacts, constraints=values
+                    )
                 )
                 before = moment
                 step_of.append(number)
@@ -367,7 +373,7 @@ class _Builder:
         faces = self.model.surfaces[self.sides_by_name[of.slave]]
         return np.unique(np.concatenate([n.ravel() for _, _, _, n in self.model.mesh.parts_of(faces)]))
 
-    def _pairs(self, sides: Sequence[Sides]) -> tuple[list[ContactPair], list[Tie]]:
+    def _pairs(self, sides: Sequence[Sides]) -> tuple[list[ContactPair], list[AnyTie]]:
         found = build_pairs(
             sides,
             self.sides_by_name,
@@ -378,23 +384,23 @@ class _Builder:
             self.model.note,
         )
         for each, pair in found:
-            kind = "tie" if isinstance(pair, Tie) else "contact"
+            kind = "contact" if isinstance(pair, ContactPair) else "tie"
             self.model.origins[kind, pair.place] = each.card.origin
         contacts = [(of, pair) for of, pair in found if isinstance(pair, ContactPair)]
         # Those that some step leaves out are the last ones.
         left_out = {pair for change in self.changes if change for pair in change.removed}
         contacts.sort(key=lambda each: (each[0].slave, each[0].master) in left_out)
         self.sides_of_pairs = [of for of, _ in contacts]
-        return [pair for _, pair in contacts], [pair for _, pair in found if isinstance(pair, Tie)]
+        return [pair for _, pair in contacts], [p for _, p in found if not isinstance(p, ContactPair)]
 
     def _scene(
         self,
         bodies: Mapping[str, Body],
         supports: Sequence[AnySupport],
         contacts: Sequence[ContactPair],
-        ties: Sequence[Tie],
+        ties: Sequence[AnyTie],
         preloads: Sequence[Preload],
-        springs: Sequence[Spring],
+        constraints: Sequence[LinearConstraint],
     ) -> Scene:
         """Return the scene before the first step; what does not suit the bodies is told with its card."""
         for kind, parts in (("contact", contacts), ("tie", ties)):
@@ -403,7 +409,7 @@ class _Builder:
                     Scene(bodies, **{f"{kind}s" if kind == "tie" else "contacts": (part,)})  # type: ignore[arg-type]
                 except InvalidInputError as error:
                     raise self.model.origins[kind, part.place].error(str(error)) from error
-        return Scene(bodies, supports, (), contacts, ties, preloads, springs=springs)
+        return Scene(bodies, supports, (), contacts, ties, preloads, constraints=constraints)
 
     def _named_surfaces(self) -> None:
         """Take all surfaces of the deck that lie on the boundary of bodies."""

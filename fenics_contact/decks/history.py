@@ -147,6 +147,7 @@ class _Course:
         self.factors: list[Amplitude | None] = [None]
         self.names: list[tuple[str, float]] = [("", 0.0)]
         self.pressures: dict[tuple[str, ...], tuple[Pressed, int, float]] = {}
+        self.pressed = set[tuple[str, ...]]()  # in the step
         self.weights: dict[tuple[str, str], tuple[Weight, int, float]] = {}
         self.temperature: np.ndarray | None = None
         self.temperature_before: np.ndarray | None = None
@@ -269,8 +270,12 @@ class _Course:
                 )
 
     def _press(self, where: tuple[str, ...], card: Card, row: int, value: float, by: int) -> None:
-        before = self.pressures.get(where)
-        self.pressures[where] = Pressed(where, card, row, value), by, before[0].value if before else 0.0
+        known = self.pressures.get(where)
+        start = 0.0 if known is None else known[0].value
+        if known is not None and where in self.pressed:  # pressures of one step add up
+            value, start = value + known[0].value, known[2]
+        self.pressed.add(where)
+        self.pressures[where] = Pressed(where, card, row, value), by, start
 
     def heat(self, card: Card, initial: np.ndarray, fresh: bool) -> None:
         """Give nodes temperatures."""
@@ -448,6 +453,7 @@ def _step(
 ) -> tuple[Step, float]:
     """Return a step and the time at its end."""
     head, seen, period = cards[0], set[str](), 1.0
+    course.pressed.clear()
     loaded = np.zeros(course.force.shape, dtype=bool)
     if "PERTURBATION" in head.parameters:
         raise head.error(

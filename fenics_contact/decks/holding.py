@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from fenics_contact._scene.constraints import ConstraintTerm, LinearConstraint
 from fenics_contact._scene.fields import NodeValues
-from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.preloads import Section as CutAt
-from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Roller, Support
 from fenics_contact.decks.couplings import (
     Bolt,
@@ -180,6 +180,11 @@ class Holding:
                     "*TRANSFORM: leave it out of that set"
                 )
             name = driven.surface
+            if not name and driven.nodes is not None and not driven.spread:
+                inside = driven.nodes[self.model.nodes_of_bodies()[driven.nodes]]
+                if len(inside) and self.model.exterior.covering(inside) is None:
+                    self.driven_at[id(driven)] = self.model.place(f"{driven.name} RIGID", inside)
+                    continue
             if name:
                 faces = self.model.exterior.faces_of(self.model.mesh.surface_named(name, driven.card))
             elif driven.nodes is not None:
@@ -206,7 +211,8 @@ class Holding:
     def body_of(self, driven: Driven) -> tuple[str, str]:
         """Return the one body of a driven surface, and the name of the surface."""
         name = self.driven_at[id(driven)]
-        bodies = [body for body, mesh in self.model.parts.meshes.items() if name in mesh.surfaces]
+        meshes = self.model.parts.meshes.items()
+        bodies = [body for body, mesh in meshes if name in mesh.surfaces or name in mesh.node_sets]
         if len(bodies) != 1:
             raise driven.card.error(
                 f"a node drives a surface of one body, {driven.name!r} is on {', '.join(bodies)}: give "
@@ -228,50 +234,101 @@ class Holding:
         )
 
     def name_nodes(self) -> None:
-        """Name the nodes of equations, and reject those that have no counterpart."""
+        """Name the nodes that an equation holds alone, and reject equations of what has no displacement."""
         inside = self.model.nodes_of_bodies()
         for each in self.model.equations:
-            same, sums = len(set(each.nodes)) == 1, sum(each.factors)
-            alike = len(each.nodes) == 2 and len(set(each.components)) == 1 and sums == 0.0
-            if (
-                max(each.components) >= self.model.dim
-                or not inside[list(each.nodes)].all()
-                or not (same or alike)
-            ):
+            at = np.array(each.nodes)
+            turned = np.array(each.components) >= self.model.dim
+            if (turned & inside[at]).any():
                 raise each.card.error(
-                    "an equation is read where components of one node have a relation, as in an inclined "
-                    "plane of symmetry, or the same component of two nodes of elements is equal; this one "
-                    "is neither: use a tie, a rigid surface or a plane of symmetry", each.row,
+                    f"component {int(np.array(each.components)[turned & inside[at]][0]) + 1} of a node of "
+                    f"elements is no displacement: components 1 to {self.model.dim} are", each.row,
                 )  # fmt: skip
-            if not same and any(node in self.model.local_axes for node in each.nodes):
-                raise each.card.error(
-                    "an equation between nodes with axes of their own, by *TRANSFORM, is along these and "
-                    "is not read: write it along x, y and z", each.row,
-                )  # fmt: skip
-            for node in each.nodes:
-                self.model.node_sets[f"NODE {self.model.mesh.numbers[node]}"] = np.array([node])
-
-    def equations(self) -> tuple[list[Roller], list[Spring]]:
-        """Return the equations: nodes that slide along planes, and pairs that move alike."""
-        rollers, springs = [], []
-        for each in self.model.equations:
-            names = [f"NODE {self.model.mesh.numbers[node]}" for node in each.nodes]
-            ends = [
-                Surface(body, name)
-                for node, name in zip(each.nodes, names, strict=True)
-                for body in self.model.parts.meshes
-                if len(self.model.in_body(body, np.array([node]))[0])
-            ]
+            if not inside[at].any():
+                raise each.card.error("needs a node of an element, this equation has none: add one", each.row)
+            for node, component in zip(at[~inside[at]], np.array(each.components)[~inside[at]], strict=True):
+                moments = [m for step in self.model.history.steps for m in step.moments]
+                if any(np.isnan(moment.held[node, component]) for moment in moments):
+                    raise each.card.error(
+                        f"node {self.model.mesh.numbers[node]} belongs to no element, its component "
+                        f"{component + 1} in an equation must have a value in all steps: give it by "
+                        "*BOUNDARY, or write the equation without it", each.row,
+                    )  # fmt: skip
             if len(set(each.nodes)) == 1:
-                normal = np.zeros(3)
-                np.add.at(normal, list(each.components), each.factors)
-                axes = self.model.local_axes.get(each.nodes[0], np.eye(3))
-                normal = (normal @ axes)[: self.model.dim]
-                rollers.append(Roller(ends[0].body, names[0], 0.0, tuple(normal.tolist())))
-            else:
-                stiffness = np.where(np.arange(self.model.dim) == each.components[0], np.inf, 0.0)
-                springs.append(Spring(ends[0], ends[1], tuple(stiffness.tolist())))
-        return rollers, springs
+                self.model.node_sets[f"NODE {self.model.mesh.numbers[at[0]]}"] = at[:1]
+
+    def equations(self) -> tuple[list[Roller], list[LinearConstraint]]:
+        """Return the equations: nodes that slide along planes, and relations of several nodes."""
+        alone = [each for each in self.model.equations if len(set(each.nodes)) == 1]
+        rollers = []
+        for each in alone:
+            normal = np.zeros(3)
+            np.add.at(normal, list(each.components), each.factors)
+            axes = self.model.local_axes.get(each.nodes[0], np.eye(3))
+            normal = (normal @ axes)[: self.model.dim]
+            node = np.array(each.nodes[:1])
+            body = next(b for b in self.model.parts.meshes if len(self.model.in_body(b, node)[0]))
+            name = f"NODE {self.model.mesh.numbers[node[0]]}"
+            rollers.append(Roller(body, name, 0.0, tuple(normal.tolist())))
+        terms = self._terms()
+        constraints = [LinearConstraint(terms, name="EQUATIONS")] if terms else []
+        return rollers, [*constraints, *self._joints()]
+
+    def _joints(self) -> list[LinearConstraint]:
+        """Return what joins bodies that share nodes, but no faces."""
+        found = []
+        for first, second, nodes in self.model.joints():
+            terms = [
+                ConstraintTerm(body, np.tile(inner, dim), np.repeat(np.eye(dim), len(inner), axis=0), factor)
+                for body, factor in ((first, 1.0), (second, -1.0))
+                for dim, (_, inner) in [(self.model.dim, self.model.in_body(body, nodes))]
+            ]
+            name = f"NODES OF {first} AND {second}"
+            found.append(LinearConstraint(terms, name=name))
+            card = self.model.mesh.blocks[0].card
+            self.model.note(
+                card, f"bodies {first} and {second} share {len(nodes)} nodes, but no faces: joined"
+            )
+        return found
+
+    @cached_property
+    def _entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Equation, node, component and factor of all terms of equations of several nodes."""
+        several = [each for each in self.model.equations if len(set(each.nodes)) > 1]
+        number = np.repeat(np.arange(len(several)), [len(each.nodes) for each in several])
+        node, component, factor = (
+            np.array([entry for each in several for entry in getattr(each, name)], dtype=kind)
+            for name, kind in (("nodes", np.int64), ("components", np.int64), ("factors", np.float64))
+        )
+        return number, node, component, factor
+
+    def _terms(self) -> list[ConstraintTerm]:
+        """Return the terms of the equations, one for each body."""
+        number, node, component, factor = self._entries
+        along = np.eye(6, 3)[component]
+        for place in np.flatnonzero(np.isin(node, np.fromiter(self.model.local_axes, dtype=np.int64))):
+            along[place] = self.model.local_axes[int(node[place])][component[place]]
+        found = []
+        for body in self.model.parts.meshes:
+            every = np.unique(node)
+            mine, inner = self.model.in_body(body, every)
+            owned = self.model.owned(body, mine)
+            mine, inner = mine[owned], inner[owned]
+            here = np.flatnonzero(np.isin(node, mine))
+            if len(here):
+                own = inner[np.searchsorted(mine, node[here])]
+                vectors = along[here, : self.model.dim]
+                found.append(ConstraintTerm(body, own, vectors, factor[here], number[here]))
+        return found
+
+    def equation_values(self, moment: Moment) -> dict[str, Any] | None:
+        """Return the values of the equations at a time, of nodes without elements; None without any."""
+        number, node, component, factor = self._entries
+        outside = ~self.model.nodes_of_bodies()[node]
+        if not outside.any():
+            return None
+        count, moved = int(number.max()) + 1, moment.held[node[outside], component[outside]]
+        return {"EQUATIONS": -np.bincount(number[outside], factor[outside] * moved, count)}
 
     def preloads(self) -> list[Preload]:
         """Return the bolts of pre-tension sections, held at their length."""
@@ -286,19 +343,18 @@ class Holding:
 
     def _section(self, bolt: Bolt, part: Component, flat: float = 1e-6) -> CutAt:
         """Return the plane of a section with the cells that it may separate, those of its elements' body."""
-        corners = np.concatenate(
-            [self.model.mesh.points[n].reshape(-1, 3) for n in self.model.mesh.corners(bolt.faces)]
-        )
+        dim = self.model.dim
+        points = self.model.mesh.points[:, :dim]
+        corners = np.concatenate([points[n].reshape(-1, dim) for n in self.model.mesh.corners(bolt.faces)])
         centre = corners.mean(axis=0)
         _, size, axes = np.linalg.svd(corners - centre)
-        dim = self.model.dim
         if size[dim - 1] > flat * size[0]:
             raise bolt.card.error(f"surface {bolt.name!r} must be flat: give faces in a plane")
-        normal = axes[dim - 1][:dim]
-        middle = self.model.middles(bolt.faces.elements)
-        normal = normal if (middle - centre)[:, :dim].mean(axis=0) @ normal < 0 else -normal
+        normal = axes[dim - 1]
+        middle = self.model.middles(bolt.faces.elements)[:, :dim]
+        normal = normal if (middle - centre).mean(axis=0) @ normal < 0 else -normal
         radius = 1.5 * float(np.linalg.norm(corners - centre, axis=1).max())
-        whole = CutAt(tuple(centre[:dim].tolist()), tuple(normal.tolist()))
+        whole = CutAt(tuple(centre.tolist()), tuple(normal.tolist()))
         return whole if self._cuts(whole, bolt, part) else replace(whole, radius=radius)
 
     def _cuts(self, section: CutAt, bolt: Bolt, part: Component) -> bool:

@@ -19,6 +19,7 @@ from fenics_contact.decks.couplings import (
 from fenics_contact.decks.history import History, read_history
 from fenics_contact.decks.initial_stress import read_initial
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
+from fenics_contact.decks.multi_point import mean_equations, read_means, read_points, shared_out
 from fenics_contact.decks.regions import split_sections
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.readers.deck_bodies import (
@@ -61,9 +62,17 @@ class Model:
         self.flowed = read_initial(cards, self.mesh, self.note, "PLASTICSTRAIN")
         self.driven = read_driven(cards, self.mesh)
         self.bolts = read_bolts(cards, self.mesh)
-        self.equations = read_equations(cards, self.mesh)
+        self.means = read_means(cards, self.mesh)
+        large = any(step.large for step in self.history.steps)
+        held = [~np.isnan(moment.held) for step in self.history.steps for moment in step.moments]
+        self.equations = [
+            *read_equations(cards, self.mesh),
+            *read_points(cards, self.mesh, large),
+            *(mean_equations(self.means, np.any(held, axis=0)) if held else ()),
+        ]
         self.local_axes = read_axes(cards, self.mesh, self.history)
         nodes = [[each.node, each.turning] for each in self.driven] + [[bolt.node] for bolt in self.bolts]
+        nodes += [[each.node] for each in self.means]
         self.references = np.array(
             [node for several in nodes for node in several if node >= 0], dtype=np.int64
         )
@@ -84,13 +93,14 @@ class Model:
             self.notes.append(text)
 
     def _turn_forces(self) -> None:
-        """Give forces on nodes with local axes along x, y and z."""
-        if self.local_axes:
+        """Give forces on nodes with local axes along x, y and z, and those of means to their nodes."""
+        if self.local_axes or self.means:
             steps = [
                 replace(
                     step,
                     moments=[
-                        replace(m, forces=in_global_axes(m.forces, self.local_axes)) for m in step.moments
+                        replace(m, forces=shared_out(in_global_axes(m.forces, self.local_axes), self.means))
+                        for m in step.moments
                     ],
                 )
                 for step in self.history.steps
@@ -274,6 +284,28 @@ class Model:
         place = np.minimum(np.searchsorted(mine, nodes), len(mine) - 1)
         there = mine[place] == nodes
         return nodes[there], place[there]
+
+    @property
+    def owner(self) -> np.ndarray:
+        """Number of the first body that has a node, −1 of nodes without elements, shape (n_nodes,)."""
+        found = np.full(len(self.mesh.points), -1)
+        for number, nodes in reversed(list(enumerate(self.parts.nodes.values()))):
+            found[nodes[nodes >= 0]] = number
+        return found
+
+    def owned(self, name: str, nodes: np.ndarray) -> np.ndarray:
+        """Return which nodes of a body no body before it has."""
+        return np.asarray(self.owner[nodes] == list(self.parts.nodes).index(name))
+
+    def joints(self) -> list[tuple[str, str, np.ndarray]]:
+        """Return pairs of bodies and the nodes that they share: the second is not the first with these."""
+        names, found = list(self.parts.nodes), []
+        for name, nodes in self.parts.nodes.items():
+            mine = nodes[nodes >= 0]
+            of = self.owner[mine]
+            for first in np.unique(of[of != names.index(name)]):
+                found.append((names[first], name, mine[of == first]))
+        return found
 
     def middles(self, elements: np.ndarray) -> np.ndarray:
         """Return the mean of the nodes of elements, (n, 3)."""

@@ -166,7 +166,11 @@ def _nodes(deck: Printing, where: str, state: State, variable: str) -> tuple[tup
     rows = np.vstack(found)
     short = {"U": "u", "RF": "f"}[variable]
     names = tuple(f"{short}{axis}" for axis in _AXES[: rows.shape[1] - 1])
-    return names, rows[np.argsort(rows[:, 0], kind="stable")]
+    nodes, first, number = np.unique(rows[:, 0], return_index=True, return_inverse=True)
+    if variable == "U" or len(nodes) == len(rows):
+        return names, rows[first]
+    sums = [np.bincount(number.ravel(), column) for column in rows[:, 1:].T]  # of bodies that share nodes
+    return names, np.column_stack([nodes, *sums])
 
 
 def _elements(deck: Printing, where: str, state: State) -> np.ndarray:

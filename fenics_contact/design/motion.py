@@ -247,6 +247,10 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
         elif own == name:
             facets = body.mesh.surfaces[surface]
             held[facets[~cut[facets].all(axis=1).any(axis=1)]] = True
+    for constraint in scene.constraints:
+        for term in constraint.terms:
+            if term.body == name:
+                held[term.nodes_of(body.mesh)] = True
     for section in body.mesh.cuts.values():
         held[section.pairs] = True
     held[design.nodes_beyond_transition(body.mesh, cut)] = True

@@ -40,6 +40,11 @@ class Relations:
         """Number of rows."""
         return len(self.which)
 
+    @property
+    def components(self) -> int:
+        """Displacement components of a node."""
+        return int(self.directions.shape[1])
+
     def of_supports(self, prescribed: np.ndarray) -> np.ndarray:
         """Return the contribution of prescribed displacements to each row, shape (n_rows,), [length].
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,8 +16,12 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import AnySupport, RigidSurface
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.constraints import ConstraintRows
 from fenics_contact.feti.contact_rows import Relations
 from fenics_contact.feti.decomposition import Tearing
+
+#: What measures relative displacements in rows.
+Measured: TypeAlias = Relations | ConstraintRows
 
 
 @displayed
@@ -52,7 +57,7 @@ class FreeMotions:
         """Number of unknowns."""
         return len(self.load)
 
-    def of_rows(self, dof: np.ndarray, relations: Sequence[Relations]) -> sp.csr_matrix:
+    def of_rows(self, dof: np.ndarray, relations: Sequence[Measured]) -> sp.csr_matrix:
         """Return Q of all rows, shape (n_rows, n), of those on nodes."""
         return sp.vstack([self.columns[dof], *_of_relations(self.columns, relations)], format="csr")
 
@@ -60,7 +65,7 @@ class FreeMotions:
         self,
         kept: sp.csr_matrix,
         equality: int,
-        relations: Sequence[Relations],
+        relations: Sequence[Measured],
         further: sp.csr_matrix | None,
         owned: np.ndarray,
     ) -> FreeMotions:
@@ -82,7 +87,7 @@ class FreeMotions:
 
 
 def without_held(
-    columns: sp.csr_matrix, relations: Sequence[Relations], fixed: np.ndarray, rounding: float = 1e-6
+    columns: sp.csr_matrix, relations: Sequence[Measured], fixed: np.ndarray, rounding: float = 1e-6
 ) -> sp.csr_matrix:
     """Return Q without friction rows that are left to normal ones, shape (n_rows, n).
 
@@ -101,9 +106,10 @@ def without_held(
     for relation, start in zip(relations, starts, strict=True):
         held = np.flatnonzero(relation.held(fixed))
         moved = columns[start + held]
-        if relation.resting is not None:  # the normal rows are those of −n
+        if isinstance(relation, Relations) and relation.resting is not None:
+            # The normal rows are those of −n.
             share = sp.diags(relation.along_normals(fixed)[held])
-            moved = moved + share @ columns[starts[1] + relation.which[held]]
+            moved = moved + share @ columns[starts[-2] + relation.which[held]]
         touched = int(np.count_nonzero(abs(moved).max(axis=1).toarray() > least)) if len(held) else 0
         if touched:
             raise InvalidInputError(
@@ -115,11 +121,11 @@ def without_held(
     return (sp.diags(felt) @ columns).tocsr()
 
 
-def _of_relations(fields: sp.csr_matrix, relations: Sequence[Relations]) -> list[sp.csr_matrix]:
+def _of_relations(fields: sp.csr_matrix, relations: Sequence[Measured]) -> list[sp.csr_matrix]:
     """Return by how much fields on nodes, (n_nodes · dim, k), close rows, shape (n_rows, k)."""
     parts = []
     for relation in relations:
-        dim = relation.directions.shape[1]
+        dim = relation.components
         modes = [column.toarray().reshape(-1, dim) for column in fields.T]
         moved = [-relation.of_supports(mode) for mode in modes] if relation.count else []
         parts.append(sp.csr_matrix(np.array(moved).reshape(fields.shape[1], relation.count).T))

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.display import displayed
 from fenics_contact._fem.loads import as_tractions
 from fenics_contact._pairing.points import (
-    HELD,
     ContactPoints,
     closures_of,
     elastic_slip,
@@ -28,9 +27,10 @@ from fenics_contact._pairing.points import (
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.true_shapes import is_approximate
-from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors import together
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.feti.constraints import ConstraintRows, constraint_rows
 from fenics_contact.feti.contact_rows import Relations, normal_relations, tangential_relations, tied_relations
 from fenics_contact.feti.decomposition import (
     Decomposition,
@@ -39,7 +39,8 @@ from fenics_contact.feti.decomposition import (
     prescribed_along,
     stack,
 )
-from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, free_motions, without_held
+from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, Measured, free_motions, without_held
+from fenics_contact.feti.initial_gaps import check_no_penetration, gap_with_room
 from fenics_contact.feti.preloads import (
     given_shortenings,
     once_at_sections,
@@ -54,33 +55,6 @@ from fenics_contact.qp.layout import ContactLayout
 
 if TYPE_CHECKING:
     from fenics_contact.qp.compliance import Closures, Compliance
-
-#: Penetration attributable to faceting, relative to the size of a slave facet.
-FACETING = 0.1
-
-
-def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
-    """Reject an initial geometry whose bodies overlap by more than their faceting explains.
-
-    Overlap that the pair declares, see `ContactPair.interference`, is a load like any other.
-    """
-    by_mortar = np.array([pair.by_mortar for pair in scene.contacts])
-    # Where a facet of length h misses an arc of curvature κ by κh²/8, the dual basis, which is negative in
-    # part, has a mean gap of -κh²/12 in addition.
-    allowed = -_explained(points) * np.where(by_mortar[points.pair], 5.0 / 3.0, 1.0)
-    deep = (points.gap < allowed) & ~points.given
-    if deep.any():
-        worst = int(np.argmin(np.where(deep, points.gap, np.inf)))
-        pair = scene.contacts[int(points.pair[worst])]
-        body = f"of {pair.slave.body!r}"
-        nodes = counted(int(deep.sum()), f"node {body} lies", f"nodes {body} lie up to")
-        raise InvalidInputError(
-            f"bodies must not overlap at the start: {nodes} "
-            f"{-points.gap[worst]:.3g} inside the master, more than the faceting of the surfaces explains "
-            f"({-allowed[worst]:.3g}): move the bodies apart; for a press fit declare the overlap by "
-            "ContactPair(interference='measured'), or give its amount, interference=0.05; adjust= puts "
-            "points in touch without strain"
-        )
 
 
 def meeting_points(
@@ -131,41 +105,6 @@ def check_apart(scene: Scene, decomposition: Decomposition) -> None:
         fixed, axes = decomposition.fixed, decomposition.axes
         points = find_contact_points(scene, fixed, decomposition.comm, axes=axes, told=True)
         check_no_penetration(scene, points)
-
-
-def gap_with_room(
-    normal: Relations,
-    fixed: np.ndarray,
-    prescribed: np.ndarray,
-    soft: np.ndarray | None = None,
-    slight: float = 0.02,
-) -> np.ndarray:
-    """Return the gaps; between surfaces held by supports, penetration due to faceting is removed.
-
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `prescribed`: prescribed
-    components of all nodes, NaN where free, shape (n_nodes, dim); `soft`: marks of points that give way,
-    which may be pressed, shape (n_points,); `slight`: supports hold a point along its
-    normal if the free fraction is no larger than this: normals of facets are slightly tilted, and sliding
-    along that tilt does not open a gap.
-    """
-    points = normal.points
-    missing = np.where(normal.freedom(fixed) <= slight, normal.of_supports(prescribed) - points.gap, 0.0)
-    if soft is not None:
-        missing[soft] = 0.0
-    # A given interference is meant: it must not vanish where nothing can yield.
-    pressed = missing > np.where(points.given, HELD, 1.0) * _explained(points)
-    if pressed.any():
-        raise InvalidInputError(
-            f"supports must leave room between surfaces that they hold on both sides, but {pressed.sum()} "
-            f"contact nodes are pressed up to {missing.max():.3g} into their master: prescribe one of the "
-            "bodies only, another displacement, or less interference there"
-        )
-    return points.gap + np.maximum(missing, 0.0)
-
-
-def _explained(points: ContactPoints) -> np.ndarray:
-    """Return the penetration that faceting explains at each point, [length]."""
-    return FACETING * points.sizes
 
 
 _LOG = logging.getLogger(__name__)
@@ -220,6 +159,7 @@ class TornSystem:
             of slip, replicated, shape (n_contact − n_friction, dim − 1), [length].
         fluid: Load and place of fluid between surfaces; None without any.
         springs: Springs between surfaces, the last rows of ties; None without any.
+        constraints: Linear constraints, whose rows come after those of ties; None without any.
         free: The free motions of rigid surfaces and unknown shortenings of preloads, which add Q q to c.
     """
 
@@ -244,6 +184,7 @@ class TornSystem:
     free: FreeMotions
     fluid: FluidLoad | None = None
     springs: SpringRows | None = None
+    constraints: ConstraintRows | None = None
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
@@ -349,7 +290,7 @@ class TornSystem:
 
     def moved_further(self, change: np.ndarray) -> TornSystem:
         """Return a system whose supports have moved, (n_nodes, dim), along axes of nodes, 0 where free."""
-        supported = np.concatenate([relation.of_supports(change) for relation in self.relations])
+        supported = np.concatenate([relation.of_supports(change) for relation in self.measured])
         supported = np.concatenate([np.zeros(self.n_gluing), supported])
         right = -supported
         right[: self.n_gluing] = change.ravel()[self.decomposition.gluing.dof]
@@ -420,7 +361,18 @@ class TornSystem:
     @property
     def first_sprung(self) -> int:
         """Number of the first row of springs."""
-        return self.n_equality - (0 if self.springs is None else self.springs.count)
+        return self.after_ties - (0 if self.springs is None else self.springs.count)
+
+    @property
+    def after_ties(self) -> int:
+        """Number of the first row of constraints, behind those of ties, sections and springs."""
+        return self.n_gluing + self.relations[0].count
+
+    @property
+    def measured(self) -> tuple[Measured, ...]:
+        """What all rows but gluing ones measure, in their order."""
+        tied, normal, slips = self.relations
+        return (tied, *(() if self.constraints is None else (self.constraints,)), normal, slips)
 
     @cached_property
     def give(self) -> np.ndarray | None:
@@ -428,7 +380,7 @@ class TornSystem:
         if self.springs is None:
             return None
         result = np.zeros(len(self.numbering.owned))
-        place = self.numbering.owned_index(np.arange(self.first_sprung, self.n_equality))
+        place = self.numbering.owned_index(np.arange(self.first_sprung, self.after_ties))
         result[place[place >= 0]] = self.springs.compliance[place >= 0]
         return result
 
@@ -555,8 +507,8 @@ def build_torn_system(
     with together(comm):
         soft = None if system.closures is None else system.closures.curve >= 0
         gap = gap_with_room(system.relations[1], decomposition.fixed, prescribed, soft) - system.reach
-    supported = np.concatenate([relation.of_supports(prescribed) for relation in system.relations])
-    tied, slip = np.zeros(system.n_equality - len(right)), np.zeros(system.tangential_rows.size)
+    supported = np.concatenate([relation.of_supports(prescribed) for relation in system.measured])
+    tied, slip = np.zeros(system.relations[0].count), np.zeros(system.tangential_rows.size)
     supported = np.concatenate([np.zeros(len(right)), supported])
     owned = system.numbering.owned
     if scene.preloads:
@@ -564,12 +516,16 @@ def build_torn_system(
         tied = drawn @ given_shortenings(scene)
     if system.springs is not None:
         tied[len(tied) - system.springs.count :] = system.springs.right
+    if system.constraints is not None:
+        with together(comm):
+            system.constraints.require_consistent(scene.constraints, prescribed, free.columns)
+        tied = np.concatenate([tied, system.constraints.right(scene.constraints)])
     right = np.concatenate([right, tied, gap, slip]) - supported
     slid = np.zeros((len(system.frictionless), system.components - 1))
     if free.count:
-        columns = free.of_rows(decomposition.gluing.dof, system.relations)
+        columns = free.of_rows(decomposition.gluing.dof, system.measured)
         with together(comm):
-            columns = without_held(columns, system.relations, decomposition.fixed)
+            columns = without_held(columns, system.measured, decomposition.fixed)
         free = replace(free, columns=columns[owned])
     else:
         free = replace(free, columns=sp.csr_matrix((len(owned), 0)))
@@ -580,7 +536,10 @@ def build_torn_system(
 
 def _meets_alike(scene: Scene, decomposition: Decomposition, known: TornSystem) -> bool:
     """Return whether two scenes have the same meshes, pairs and held components, whatever fluid is there."""
-    rest = [[*each.ties, *each.springs, *(p.key for p in each.preloads)] for each in (scene, known.scene)]
+    rest = [
+        [*each.ties, *each.springs, *(c.key for c in each.constraints), *(p.key for p in each.preloads)]
+        for each in (scene, known.scene)
+    ]
     same = scene.has_meshes_of(known.scene) and known.decomposition is decomposition
     return same and rest[0] == rest[1] and contacts_alike(scene, known.scene)
 
@@ -603,9 +562,10 @@ def _joined(
 ) -> TornSystem:
     """Search for contact and build B; the right side is left empty. Collective."""
     told = previous is not None and previous.scene.has_surfaces_of(scene)
-    points, ties = meeting_points(scene, decomposition, overlap=overlap, told=told)
+    met = meeting_points(scene, decomposition, overlap=overlap, told=told)
     known = None if previous is None else previous.numbering
-    system = _with_rows(scene, decomposition, subdomains, (points, ties), known, prescribed)
+    kept = constraint_rows(scene, decomposition, None if previous is None else previous.constraints)
+    system = _with_rows(scene, decomposition, subdomains, met, known, prescribed, constraints=kept)
     if decomposition.comm.rank == 0:
         _log_held(system.relations[2], decomposition.fixed)
     return system
@@ -625,7 +585,7 @@ def meeting_at(
     ties, known = torn.ties, torn.numbering
     system = _with_rows(
         torn.scene, torn.decomposition, torn.subdomains, (points, ties), known, prescribed,
-        [rows for rows, _ in further],
+        [rows for rows, _ in further], torn.constraints,
     )  # fmt: skip
     owned = system.numbering.owned
     right, supported = np.zeros((2, len(owned)))
@@ -651,6 +611,7 @@ def _with_rows(
     known: DualNumbering | None,
     prescribed: np.ndarray,
     further: Sequence[Rows] = (),
+    constraints: ConstraintRows | None = None,
 ) -> TornSystem:
     """Build B for contact points and tied ones; the right side is left empty. Collective."""
     points, ties = met
@@ -660,18 +621,21 @@ def _with_rows(
     axes = decomposition.axes
     tied = tied_relations(ties, scene.ties, fixed, axes)
     springs = SpringRows.of(scene) if scene.springs else None
-    if springs is not None:
-        tied = with_springs(tied, springs)
+    tied = tied if springs is None else with_springs(tied, springs)
     slips = tangential_relations(points, frictional, prescribed, axes)
     relations = (tied, normal_relations(points, axes), slips)
-    rows = stack([gluing, *(relation.rows(tearing, fixed) for relation in relations), *further])
+    parts = [relation.rows(tearing, fixed) for relation in relations]
+    parts[1:1] = [] if constraints is None else [constraints.rows(tearing)]
+    equality = sum(part.count for part in (gluing, *parts[:-2]))
+    rows = stack([gluing, *parts, *further])
     numbering, B = _own_part(rows, decomposition, known)
     return TornSystem(
-        scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
+        scene, decomposition, subdomains, points, ties, equality, frictional,
         coefficient[frictional], tresca[frictional],
         None if strengths is None else strengths.part(frictional), closures_of(scene, points),
         None if elastic is None else elastic[frictional], numbering, relations, B,
         np.zeros(0), np.zeros(0), np.zeros((0, scene.components - 1)), NO_MOTIONS, springs=springs,
+        constraints=constraints,
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI, PETSc
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.constraints import LinearConstraint
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.plan import SolverKind
@@ -71,6 +72,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
         **({"preloads": readable(scene.preloads)} if scene.preloads else {}),
         **({"foundations": readable(scene.foundations)} if scene.foundations else {}),
         **({"springs": readable(scene.springs)} if scene.springs else {}),
+        **({"constraints": [_constraint(each) for each in scene.constraints]} if scene.constraints else {}),
     }
 
 
@@ -119,6 +121,8 @@ def forces_record(state: State) -> dict[str, Any]:
         drawn["foundations"] = [_on_surface(each) for each in state.foundations()]
     if state.scene.springs:
         drawn["springs"] = springs_record(state)
+    if state.scene.constraints:
+        drawn["constraints"] = constraints_record(state)
     if any(pair.has_friction for pair in state.scene.contacts):
         drawn["friction"] = [_on_surface(each) for each in pairs.friction]
     return {
@@ -165,6 +169,25 @@ def springs_record(state: State) -> list[dict[str, Any]]:
         }
         for name, each in state.springs().items()
     ]
+
+
+def constraints_record(state: State) -> list[dict[str, Any]]:
+    """Return the forces of linear constraints on bodies. Collective."""
+    return [
+        {
+            "name": name,
+            "equations": len(each.force),
+            "largest": float(np.abs(each.force).max()),
+            "bodies": [{"body": body, "force": total} for body, total in each.on_bodies.items()],
+        }
+        for name, each in state.constraints().items()
+    ]
+
+
+def _constraint(constraint: LinearConstraint) -> dict[str, Any]:
+    value = constraint.value if isinstance(constraint.value, float) else f"{len(constraint.value)} values"
+    terms = [term.in_words for term in constraint.terms]
+    return {"name": constraint.label, "terms": terms, "value": value}
 
 
 def listed_forces(forces: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
@@ -301,7 +324,9 @@ surface, ``force``, ``moment`` and the point ``about`` which it is; where there 
 and the part of ``friction`` in each of the contacts likewise, and of ``preloads`` ``name``, \
 ``axial_force``, ``shortening``, ``shear``, ``bending`` and \
 ``torsion``, of ``springs`` ``name``, ``force`` on the first end, ``directions``, ``tension`` and \
-``elongation``; ``balance`` of all with the loads, its ``imbalance`` and the scales to which it is relative |
+``elongation``, of ``constraints`` ``name``, ``equations``, the ``largest`` of their forces and of each of \
+``bodies`` ``body`` and ``force``; ``balance`` of all with the loads, its ``imbalance`` and the scales to \
+which it is relative |
     | ``rigid_motions`` | of each rigid surface body, surface, ``displacement`` and ``rotation`` of the \
 point ``about`` |
     | ``tools`` | of each rigid tool by name ``displacement``, ``rotation``, and ``force`` and ``moment`` of \

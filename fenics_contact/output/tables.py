@@ -187,6 +187,7 @@ class StepTable:
     | ``tool NAME ux``, ..., ``tool NAME turn x``, ... | displacement and rotation of each rigid tool |
     | ``tool NAME Fx``, ..., ``tool NAME Mx``, ... | force of contact on it, and moment about its point |
     | ``spring NAME tension``, ``... elongation`` | of springs between surfaces, with the axis if in several |
+    | ``constraint NAME lid Fx``, ... | force of a linear constraint on a body |
     | ``lid bottom on pot rim Fx``, ... | force on the slave of a pair or tie |
     | ``lid bottom on pot rim pressure``, ``... area`` | the largest pressure, and the area of contact |
 
@@ -256,10 +257,16 @@ class StepTable:
         for listed in (pairs.contacts, pairs.ties):
             found |= dict(zip(_names(listed.places), listed, strict=True))
         columns = self._springs(state, balance.force_scale) if state.scene.springs else {}
+        for name, each in state.constraints().items() if state.scene.constraints else ():
+            for body, total in each.on_bodies.items():
+                columns |= {
+                    f"constraint {name} {body} F{axis}": float(x)
+                    for axis, x in zip("xyz", rounded(total, balance.force_scale), strict=False)
+                }
         columns |= _tools(state, balance)
-        for name, each in found.items():
-            self._about.setdefault(name, each.about)
-            columns |= _of_resultant(name, each, balance)
+        for name, part in found.items():
+            self._about.setdefault(name, part.about)
+            columns |= _of_resultant(name, part, balance)
         return columns
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""Bodies of a deck: elements that share nodes, with the sections that give them materials."""
+"""Bodies of a deck: elements that share faces, with the sections that give them materials."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
     sections: list[Section] = []
     of_element = np.full(len(mesh.element_numbers), -1)
     for card in cards:
-        if card.name == "SOLIDSECTION":
+        if card.name == "SOLIDSECTION" and card.required("ELSET") not in mesh.couplings:
             name = card.required("ELSET")
             of_element[mesh.elements_named(name, card)] = len(sections)
             thick = card.floats(0)[0] if card.lines and card.rows[0][0] else 1.0
@@ -61,7 +61,7 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """Elements that share nodes.
+    """Elements that share faces.
 
     Attributes:
         elements: Their positions, ascending.
@@ -75,12 +75,12 @@ class Component:
 
 def components(mesh: DeckMesh, sections: Sequence[Section], of_element: np.ndarray) -> list[Component]:
     """Return the bodies of a deck by their elements, each with a name of its own."""
-    rows = [
-        np.repeat(block.first + np.arange(len(block.nodes)), block.element.count) for block in mesh.blocks
-    ]
-    row, column = np.concatenate(rows), np.concatenate([block.nodes.ravel() for block in mesh.blocks])
     count = len(mesh.element_numbers)
-    graph = sp.coo_matrix((np.ones(len(row)), (row, count + column)), shape=(count + len(mesh.points),) * 2)
+    every, corners, _ = _every_face(mesh)
+    _, face = np.unique(np.sort(corners, axis=1), axis=0, return_inverse=True)
+    face = face.ravel()
+    size = count + int(face.max()) + 1
+    graph = sp.coo_matrix((np.ones(len(face)), (every.elements, count + face)), shape=(size, size))
     _, label = connected_components(graph, directed=False)
     _, first, number = np.unique(label[:count], return_index=True, return_inverse=True)
     names: list[str] = []
@@ -126,18 +126,7 @@ class Exterior:
     @staticmethod
     def of(mesh: DeckMesh) -> Exterior:
         """Return that of a mesh."""
-        elements, sides = [], []
-        for block in mesh.blocks:
-            known = np.flatnonzero([len(face) > 0 for face in block.element.faces])
-            elements.append(np.repeat(block.first + np.arange(len(block.nodes)), len(known)))
-            sides.append(np.tile(known, len(block.nodes)))
-        every = Faces(np.concatenate(elements), np.concatenate(sides))
-        corners = np.full((len(every), 4), -1)
-        nodes = np.full((len(every), 9), -1)
-        for mine, element, side, members in mesh.parts_of(every):
-            nodes[mine[:, None], np.arange(members.shape[1])] = members
-            width = len(element.faces[side])
-            corners[mine[:, None], np.arange(width)] = members[:, :width]
+        every, corners, nodes = _every_face(mesh)
         _, number, count = np.unique(
             np.sort(corners, axis=1), axis=0, return_inverse=True, return_counts=True
         )
@@ -182,6 +171,23 @@ class Exterior:
         inside = self.within(nodes)
         mine = np.concatenate([part.ravel() for _, _, _, part in self.mesh.parts_of(inside)] or [nodes[:0]])
         return inside if len(nodes) and np.array_equal(np.unique(mine), np.unique(nodes)) else None
+
+
+def _every_face(mesh: DeckMesh) -> tuple[Faces, np.ndarray, np.ndarray]:
+    """Return the faces of all elements, their corners and their nodes, −1 behind the last."""
+    elements, sides = [], []
+    for block in mesh.blocks:
+        known = np.flatnonzero([len(face) > 0 for face in block.element.faces])
+        elements.append(np.repeat(block.first + np.arange(len(block.nodes)), len(known)))
+        sides.append(np.tile(known, len(block.nodes)))
+    every = Faces(np.concatenate(elements), np.concatenate(sides))
+    corners = np.full((len(every), 4), -1)
+    nodes = np.full((len(every), 9), -1)
+    for mine, element, side, members in mesh.parts_of(every):
+        nodes[mine[:, None], np.arange(members.shape[1])] = members
+        width = len(element.faces[side])
+        corners[mine[:, None], np.arange(width)] = members[:, :width]
+    return every, corners, nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,7 +329,7 @@ def integration_of(
 def read_deck_mesh(path: str | Path, comm: MPI.Comm | None = None) -> dict[str, BodyMesh]:
     """Read the mesh of a deck of CalculiX or Abaqus: its bodies, with regions, surfaces and node sets.
 
-    Bodies are elements that share nodes, named by their element sets; sections are regions where a body has
+    Bodies are elements that share faces, named by their element sets; sections are regions where a body has
     several. Surfaces are those of ``*SURFACE`` on the boundary, node sets those of ``*NSET``. All other cards
     are of no concern to a mesh; `fenics_contact.decks.read_deck` reads whole decks.
 

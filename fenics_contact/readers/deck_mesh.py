@@ -64,6 +64,7 @@ class DeckMesh:
         element_sets: Name -> ascending positions of elements.
         surfaces: Name -> faces or nodes.
         origins: Name of a set -> its first card.
+        couplings: Name of a set of elements DCOUP3D, which are no cells -> positions of their nodes.
     """
 
     numbers: np.ndarray
@@ -74,6 +75,7 @@ class DeckMesh:
     element_sets: dict[str, np.ndarray] = field(default_factory=dict)
     surfaces: dict[str, Named] = field(default_factory=dict)
     origins: dict[str, Card] = field(default_factory=dict)
+    couplings: dict[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def block_of(self) -> np.ndarray:
@@ -180,6 +182,11 @@ def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
     """Return nodes, elements, sets and surfaces of a deck."""
     numbers, points, numbers_of = _nodes([card for card in cards if card.name == "NODE"])
     mesh = DeckMesh(numbers, points, [], np.zeros(0, dtype=np.int64))
+    coupling = [card for card in cards if card.name == "ELEMENT" and card.name_of("TYPE") == "DCOUP3D"]
+    for card in coupling:
+        nodes = mesh.positions(card.integers(2)[:, 1], "node", card)
+        mesh.couplings[card.required("ELSET")] = nodes
+    cards = [card for card in cards if card not in coupling]
     _elements(mesh, [card for card in cards if card.name == "ELEMENT"])
     for card in cards:
         if card.name == "NODE" and card.name_of("NSET"):

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from fenics_contact._accuracy.state_errors import BalancedTolerance, SolverErrors, StateErrors
     from fenics_contact._base.costs import Costs, PhaseCosts
     from fenics_contact.qp.fixed_point import Damping
+    from fenics_contact.results.constraints import ConstraintForce, ConstraintForces
     from fenics_contact.results.contact import ContactResult
     from fenics_contact.results.fields import GatheredFields
     from fenics_contact.results.forces import Balance, PairResultants, Resultant, Resultants
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 __all__ = [
     "Balance",
     "BalancedTolerance",
+    "ConstraintForce",
+    "ConstraintForces",
     "ContactResult",
     "Costs",
     "Damping",

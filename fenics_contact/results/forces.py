@@ -9,7 +9,6 @@ import numpy as np
 
 from fenics_contact._base.checks import GivenVector, unit_vector
 from fenics_contact._base.display import displayed
-from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.foundations import ElasticFoundation
@@ -46,6 +45,7 @@ class NodalForces:
         moved: Displacement of the points of rigid surfaces by body and surface, shape (dim,), [length]; their
             loads act there; at undeformed ones where they are not among them.
         springs: What springs of tools exert that are not among the beds, by body and surface.
+        constraint: Of linear constraints, shape (n_nodes, dim); None without any.
     """
 
     places: np.ndarray
@@ -57,6 +57,7 @@ class NodalForces:
     foundations: tuple[np.ndarray, ...] = ()
     moved: Mapping[tuple[str, str], np.ndarray] = field(default_factory=dict)
     springs: Mapping[tuple[str, str], Resultant] = field(default_factory=dict)
+    constraint: np.ndarray | None = None
 
     def point_load(self, support: RigidSurface, about: np.ndarray, axisymmetric: bool = False) -> Resultant:
         """Return the load at the point of a rigid surface, about another point."""
@@ -81,7 +82,11 @@ def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndar
     """
     decomposition = torn.decomposition
     contact, tie = _contact_forces(torn, multiplier), _tie_forces(torn, multiplier)
-    joined = torn.points.on_nodes(contact) + torn.ties.on_nodes(tie)
+    joined, constraint = torn.points.on_nodes(contact) + torn.ties.on_nodes(tie), None
+    if torn.constraints is not None:
+        of_equations = torn.constraints.forces(torn.numbering, torn.after_ties, multiplier)
+        constraint = torn.constraints.on_nodes(of_equations)
+        joined += constraint
     connecting = -nodal_sum(decomposition, torn.force(multiplier))
     acting, fixed, axes = connecting - joined, decomposition.fixed, decomposition.axes
     reaction = np.where(fixed, acting, 0.0)
@@ -97,6 +102,7 @@ def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndar
         tuple(
             nodal_sum(decomposition, -_sprung(torn, displacement, each)) for each in torn.scene.foundations
         ),
+        constraint=constraint,
     )
 
 
@@ -117,7 +123,7 @@ def _contact_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
 def _tie_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
     """Return the forces on the slave nodes of ties, shape (n_ties, dim), replicated, [force]. Collective."""
     rows = torn.relations[0]
-    of_ties = torn.numbering.gather(multiplier, np.arange(torn.n_gluing, torn.n_equality))
+    of_ties = torn.numbering.gather(multiplier, np.arange(torn.n_gluing, torn.after_ties))
     # A row that supports determine is not in B.
     acting = np.where(rows.held(torn.decomposition.fixed), 0.0, of_ties)
     force = np.zeros((torn.ties.count, torn.components))
@@ -530,7 +536,8 @@ class Balance:
         obstacles: Of rigid obstacles that are no tools.
         gaps: Of contacts and ties between bodies, and of tools: both sides together have no force, but a
             moment where friction, a tie or a mean over facets transmits forces across a gap, or where one
-            body has moments about undeformed places and the other about deformed ones.
+            body has moments about undeformed places and the other about deformed ones. Linear constraints
+            are among them, which have a force, too, unless the factors of every equation cancel.
         beds: Of elastic foundations, springs, also those of tools, and materials that resist rigid motions.
         force_scale: Largest sum of the sizes of the nodal forces of one of these, [force]; where nothing acts
             a force below which bodies count as free of forces.
@@ -573,19 +580,6 @@ class Balance:
         scales = self.force_scale, self.moment_scale
         lines = table([(name,) for name in shown], tuple(shown.values()), scales)
         return f"{lines}\nimbalance {self.imbalance:.1e}"
-
-
-def rounding_force(torn: TornSystem, displacement: np.ndarray) -> float:
-    """Return a force far above what rounding makes of a displacement, and far below one that strains by it.
-
-    Collective.
-
-    `displacement`: u of this rank, torn, shape (torn_size,), [length].
-    """
-    comm = torn.decomposition.comm
-    stiff = max((float(part.stiffness.diagonal().max()) for part in torn.subdomains), default=0.0)
-    square, count = comm.allreduce(np.array([displacement @ displacement, displacement.size]))
-    return float(np.sqrt(ROUNDING * square / count) * comm.allreduce(stiff, op=MPI.MAX))
 
 
 def force_balance(
@@ -636,11 +630,12 @@ def _parts(torn: TornSystem, forces: NodalForces) -> dict[str, np.ndarray]:
     springs = torn.ties.count - len(torn.scene.springs)
     tied = by_node(torn.ties, forces.tie, np.arange(springs))
     sprung = by_node(torn.ties, forces.tie, np.arange(springs, torn.ties.count))
+    constrained = 0.0 if forces.constraint is None else forces.constraint
     return {
         "loads": forces.load,
         "reactions": forces.reaction + by_node(torn.points, forces.contact, driven),
         "obstacles": by_node(torn.points, forces.contact, np.flatnonzero(~meets_body & ~tools)),
-        "gaps": by_node(torn.points, forces.contact, np.flatnonzero(meets_body)) + tied,
+        "gaps": by_node(torn.points, forces.contact, np.flatnonzero(meets_body)) + tied + constrained,
         "beds": sum(forces.foundations, forces.bed) + sprung,
     }
 

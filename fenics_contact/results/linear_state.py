@@ -9,16 +9,18 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import Task
+from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._base.threads import one_thread
 from fenics_contact.errors import InvalidInputError, collectively
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.face_newton import FaceNewton
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.results.contact import RowValues
 from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
-from fenics_contact.results.forces import rounding_force
 from fenics_contact.results.rigid_motions import UnheldMotion, unheld_motions
 from fenics_contact.results.state import State, comm_of
 
@@ -121,7 +123,7 @@ class LinearState(State):
 
     @cached_property
     def _least_force(self) -> float:
-        return rounding_force(self.torn, self.torn_displacement)
+        return _rounding_force(self.torn, self.torn_displacement)
 
 
 def as_linear(state: State, what: str) -> LinearState:
@@ -173,3 +175,16 @@ def _geometry_error(
 def _peak(system: DualSystem, solution: DualSolution) -> float:
     displacement = system.displacement(solution.multiplier, solution.alpha)
     return float(contact_result(system.torn, row_values(system, solution), displacement).pressure.max())
+
+
+def _rounding_force(torn: TornSystem, displacement: np.ndarray) -> float:
+    """Return a force far above what rounding makes of a displacement, and far below one that strains by it.
+
+    Collective.
+
+    `displacement`: u of this rank, torn, shape (torn_size,), [length].
+    """
+    comm = torn.decomposition.comm
+    stiff = max((float(part.stiffness.diagonal().max()) for part in torn.subdomains), default=0.0)
+    square, count = comm.allreduce(np.array([displacement @ displacement, displacement.size]))
+    return float(np.sqrt(ROUNDING * square / count) * comm.allreduce(stiff, op=MPI.MAX))

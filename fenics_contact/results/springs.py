@@ -68,7 +68,7 @@ def spring_forces(torn: TornSystem, forces: NodalForces, multiplier: np.ndarray)
     springs, rows = torn.scene.springs, torn.springs
     if rows is None:
         return SpringForces({})
-    tension = torn.numbering.gather(multiplier, np.arange(torn.first_sprung, torn.n_equality))
+    tension = torn.numbering.gather(multiplier, np.arange(torn.first_sprung, torn.after_ties))
     elongation = rows.compliance * (tension - rows.tension)
     on_first = -forces.tie[torn.ties.count - len(springs) :]
     found = {}

@@ -24,6 +24,7 @@ from fenics_contact.feti.averages import nodal_mean
 from fenics_contact.feti.direct import DirectSolution
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.solution import Solution
+from fenics_contact.results.constraints import ConstraintForces, constraint_forces
 from fenics_contact.results.contact import ContactResult, RowValues, Status
 from fenics_contact.results.fields import (
     GatheredFields,
@@ -509,6 +510,15 @@ class State(ABC):
             >>> state.springs()["rod"].tension  # doctest: +SKIP
         """
         return spring_forces(self.torn, self._nodal_forces, self.solution.multiplier)
+
+    @collectively("State.constraints", comm_of)
+    def constraints(self) -> ConstraintForces:
+        """Return the forces of every `LinearConstraint` by its name. Collective.
+
+        Example:
+            >>> state.constraints()["geared"].force  # doctest: +SKIP
+        """
+        return constraint_forces(self.torn, self.solution.multiplier)
 
     @collectively("State.preloads", comm_of)
     def preloads(self) -> Preloads:

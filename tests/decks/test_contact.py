@@ -127,7 +127,7 @@ WRONG = [
     ),
     (PAIR.replace("FEET", "TABLE"), "TABLE, TABLE", r"contact of body 'LOW' with itself needs"),
     ("*TIE, NAME=T\nTABLE, TABLE\n", "TABLE, TABLE", r"body 'LOW' cannot be tied to itself"),
-    ("*TIE, NAME=T, CYCLIC SYMMETRY\nFEET, TABLE\n", "*TIE", r"the parameter CYCLICSYMMETRY is not read"),
+    ("*TIE, NAME=T, CYCLIC SYMMETRY\nFEET, TABLE\n", "*TIE", r"needs a \*CYCLIC SYMMETRY MODEL with TIE=T"),
 ]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import RigidSurface, Roller, Spring, Support, TotalForce
+from fenics_contact import LinearConstraint, RigidSurface, Roller, Support, TotalForce
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
 from tests.decks.texts import (
@@ -115,7 +115,7 @@ def test_equations_let_nodes_slide_and_move_alike(tmp_path: Path) -> None:
     slide = "*EQUATION\n2\n17, 1, 1., 17, 2, 1.\n2\n18, 3, 1., 20, 3, -1.\n"
     found = read_deck(deck(tmp_path, BAR + FIXED + slide + step("*CLOAD\n17, 2, 5.\n20, 3, -4.\n")))
     assert [type(each) for each in found.scene.supports] == [Support, Roller]
-    assert [type(each) for each in found.scene.springs] == [Spring]
+    assert [type(each) for each in found.scene.constraints] == [LinearConstraint]
     (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
     moved = dict(zip(found.node_numbers["BAR"].tolist(), state.gather_displacement("BAR"), strict=True))
     assert abs(moved[17][0]) > 1e-6
@@ -134,17 +134,58 @@ def test_an_equation_of_a_node_with_axes_is_along_these(tmp_path: Path) -> None:
     assert 3 * moved[17][1] == pytest.approx(moved[17][0], abs=1e-12)
 
 
+def test_an_equation_of_several_nodes_is_along_their_axes_and_has_the_value_of_a_node_alone(
+    tmp_path: Path,
+) -> None:
+    """u_x of node 17, whose axis 1 is y, and three times that of 18 add up to half that of node 501."""
+    turned = "*NSET, NSET=T\n17\n*TRANSFORM, NSET=T, TYPE=R\n0., 1., 0., -1., 0., 0.\n"
+    slide = "*EQUATION\n3\n17, 1, 1., 18, 1, 3.,\n501, 2, -0.5\n"
+    steps = step("*BOUNDARY\n501, 2, 2, 0.01\n") + step("*BOUNDARY\n501, 2, 2, -0.03\n")
+    found = read_deck(deck(tmp_path, BAR + REFERENCE + FIXED + turned + slide + steps))
+    for state, value in zip(found.solve(MPI.COMM_SELF, tolerance=1e-11), (0.005, -0.015), strict=True):
+        moved = dict(zip(found.node_numbers["BAR"].tolist(), state.gather_displacement("BAR"), strict=True))
+        assert moved[17][1] + 3.0 * moved[18][0] == pytest.approx(value, rel=1e-8)
+        held = state.constraints()["EQUATIONS"]
+        np.testing.assert_allclose(held.on_bodies["BAR"], held.force * [3.0, 1.0, 0.0], rtol=1e-9)
+
+
+def test_bodies_that_share_nodes_but_no_faces_are_joined_there(tmp_path: Path) -> None:
+    """Two cubes with an edge in common: the load goes once to each of its nodes, and passes on."""
+    cubes = "*NODE\n" + "".join(
+        f"{k}, {x}, {y}, {z}\n"
+        for k, (x, y, z) in enumerate(
+            [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1),
+             (2, 1, 0), (2, 2, 0), (1, 2, 0), (2, 1, 1), (2, 2, 1), (1, 2, 1)], 1
+        )
+    )  # fmt: skip
+    cubes += "*ELEMENT, TYPE=C3D8, ELSET=BAR\n1, 1, 2, 3, 4, 5, 6, 7, 8\n2, 3, 9, 10, 11, 7, 12, 13, 14\n"
+    held = "*BOUNDARY\n1, 1, 3\n2, 2, 3\n4, 3\n5, 1, 2\n9, 2\n13, 3\n"
+    text = cubes + STEEL + SECTION + held + step("*CLOAD\n3, 1, 4.\n11, 1, 8.\n*NODE PRINT\nU, RF\n")
+    found = read_deck(deck(tmp_path, text))
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-11)
+    moved = {
+        name: dict(zip(found.node_numbers[name].tolist(), state.gather_displacement(name), strict=True))
+        for name in found.scene.bodies
+    }
+    for node in (3, 7):
+        np.testing.assert_allclose(moved["BAR"][node], moved["BAR 2"][node], atol=1e-12)
+    assert abs(moved["BAR"][3]).max() > 1e-6
+    balance = state.balance()
+    np.testing.assert_allclose(balance.loads.force, [12.0, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(balance.reactions.force, [-12.0, 0.0, 0.0], atol=1e-8)
+    table, forces = found.tables(state)
+    assert table.rows[:, 0].tolist() == list(range(1, 15))
+    np.testing.assert_allclose(forces.rows[:, 1:].sum(axis=0), [-12.0, 0.0, 0.0], atol=1e-8)
+    assert any("share 2 nodes, but no faces" in note for note in found.notes)
+
+
 WRONG = [
-    (
-        "*TRANSFORM, NSET=BAR_X1, TYPE=R\n0., 1., 0., -1., 0., 0.\n*EQUATION\n2\n17, 1, 1., 18, 1, -1.\n",
-        r"an equation between nodes with axes of their own",
-    ),
     (
         "*TRANSFORM, NSET=REF, TYPE=R\n0., 1., 0., -1., 0., 0.\n" + KINEMATIC,
         r"the node of a rigid surface must move along x, y and z",
     ),
     (
-        RIGID.replace("NSET=BAR_X1", "NSET=FEW").replace("*RIGID", "*NSET, NSET=FEW\n17, 18\n*RIGID"),
+        RIGID.replace("NSET=BAR_X1", "ELSET=FEW").replace("*RIGID", "*ELSET, ELSET=FEW\n1, 2\n*RIGID"),
         r"'FEW' must be faces on the boundary",
     ),
     (RIGID.replace("REF NODE=501, ", ""), r"\*RIGID BODY: needs the parameter REFNODE="),
@@ -153,7 +194,9 @@ WRONG = [
     (KINEMATIC.replace("COUPLING,", "COUPLING, ORIENTATION=A,"), r"ORIENTATION is not read here"),
     (SPREAD + "*BOUNDARY\n501, 1\n", r"a distributing coupling takes forces, but its node is held"),
     ("*BOUNDARY\n17, 4, 4, 0.1\n", r"nodes of solid elements have no rotation, but 17 is turned"),
-    ("*EQUATION\n2\n17, 1, 1., 18, 1, 2.\n", r"an equation is read where components of one node"),
+    ("*EQUATION\n2\n17, 1, 1., 18, 4, 2.\n", r"component 4 of a node of elements is no displacement"),
+    ("*EQUATION\n1\n501, 1, 1.\n", r"needs a node of an element"),
+    ("*EQUATION\n2\n17, 1, 1., 501, 1, 1.\n", r"node 501 belongs to no element, its component 1"),
     ("*EQUATION\n2\n17, 1, 1.\n", r"needs 2 terms of node, component and factor"),
     ("*EQUATION\n2\nBAR_X1, 1, 1., 18, 1, -1.\n", r"needs single nodes, got a set of several"),
     ("*EQUATION, REMOVE\n1\n", r"REMOVE is not read"),

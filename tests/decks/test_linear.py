@@ -294,7 +294,7 @@ def test_tables_of_elements_of_several_types_have_their_numbers(tmp_path: Path) 
         for i in range(3)
         for k, (y, z) in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)])
     )
-    elements = "*ELEMENT, TYPE=C3D6, ELSET=BAR\n7, 5, 6, 7, 9, 10, 11\n8, 5, 7, 8, 9, 11, 12\n"
+    elements = "*ELEMENT, TYPE=C3D6, ELSET=BAR\n7, 5, 8, 9, 6, 7, 10\n8, 9, 8, 12, 10, 7, 11\n"
     elements += "*ELEMENT, TYPE=C3D8, ELSET=BAR\n3, 1, 5, 6, 2, 4, 8, 7, 3\n"
     text = nodes + elements + STEEL + SECTION + "*BOUNDARY\n1, 1, 3\n2, 1\n3, 1\n4, 1, 2\n"
     found = read_deck(deck(tmp_path, text + step("*CLOAD\n9, 1, 1.\n*EL PRINT, ELSET=BAR\nS\n")))

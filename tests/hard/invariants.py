@@ -12,7 +12,7 @@ from fenics_contact import Scene
 from fenics_contact._scene.plan import resisted_motions
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.feti.decomposition import prescribed_displacements
-from fenics_contact.feti.torn import gap_with_room
+from fenics_contact.feti.initial_gaps import gap_with_room
 from fenics_contact.materials import rigid_body_modes
 from fenics_contact.results.deformed_state import AnyState
 from tests.contact.checks import residuals

@@ -23,6 +23,7 @@ from fenics_contact import (
     BodyMesh,
     Checkpoint,
     ClosureTable,
+    ConstraintTerm,
     ContactProblem,
     Coulomb,
     CyclicSymmetry,
@@ -36,6 +37,7 @@ from fenics_contact import (
     InitialStress,
     Kept,
     LinearClosure,
+    LinearConstraint,
     LoadSequence,
     LoadStep,
     MovingObstacle,
@@ -129,6 +131,8 @@ from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results import (
     BalancedTolerance,
+    ConstraintForce,
+    ConstraintForces,
     Preloads,
     RigidMotion,
     SectionForces,
@@ -171,6 +175,7 @@ def objects() -> dict[str, Any]:
     search.arguments("SLSQP")["fun"](np.zeros(60))
     weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
     sprung = SpringForce(np.eye(3)[2], np.array([0.1]), np.eye(3)[2:])
+    held = ConstraintForce(np.zeros(60), {"block": np.zeros(3)})
     drawn = SectionForces(0.1, np.eye(3)[2], state.balance().loads)
     roots = [
         shape.function(TotalPotential()),
@@ -188,6 +193,8 @@ def objects() -> dict[str, Any]:
         Remeshed(shape), Remeshing(np.zeros(60), 1.0, 1.1),
         ElasticFoundation("block", "z0", 1.0), Spring(Surface("block", "z1"), (0, 0, 9), 1.0),
         Preload("block", Section((0, 0, 0.5), (0, 0, 1))), PointForce("block", "tip", (0.0, 0.0, 1.0)),
+        ConstraintTerm("block", [0, 1], "x"), LinearConstraint([ConstraintTerm("block", [0, 1], "x")]),
+        ConstraintForces({"one": held}), held,
         Preloads({"block": drawn}), drawn, SpringForces({"rod": sprung}), sprung,
         RigidMotion(Surface("block", "z1"), np.zeros(3), np.ones(3), np.arange(3.0)),
         Chart(lambda x: x, np.zeros((60, 3))),

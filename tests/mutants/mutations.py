@@ -100,7 +100,7 @@ MUTATIONS = (
     ),
     Mutation(
         "bodies may overlap",
-        "feti/torn.py",
+        "feti/initial_gaps.py",
         "FACETING = 0.1",
         "FACETING = 10.0",
         ("tests/pairing/test_contact_search.py::test_overlapping_bodies_are_refused",),

@@ -1,0 +1,198 @@
+"""Multi-point constraints and means of a deck as equations between components of nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from fenics_contact.decks.couplings import Equation
+from fenics_contact.readers.deck_cards import Card
+from fenics_contact.readers.deck_mesh import DeckMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Mean:
+    """A node that moves as the weighted mean of others, and whose forces these share.
+
+    Attributes:
+        weights: Of the others, with the sum one.
+    """
+
+    card: Card
+    node: int
+    nodes: np.ndarray
+    weights: np.ndarray
+
+
+def read_means(cards: Sequence[Card], mesh: DeckMesh) -> list[Mean]:
+    """Return the distributing couplings by elements."""
+    found = []
+    for card in cards:
+        if card.name != "DISTRIBUTINGCOUPLING":
+            continue
+        name = card.required("ELSET")
+        if name not in mesh.couplings:
+            raise card.error(f"needs ELSET= a set with an element of type DCOUP3D, got {name!r}: add one")
+        sums = np.zeros(len(mesh.points))
+        for row, entries in enumerate(card.rows):
+            sums[mesh.nodes_named(entries[0], card, row)] += (card.floats(row, 1) or [1.0])[0]
+        nodes = np.flatnonzero(sums)
+        if not len(nodes) or (sums < 0.0).any():
+            raise card.error("needs nodes or sets with weights above zero: add them")
+        found += [Mean(card, int(n), nodes, sums[nodes] / sums.sum()) for n in mesh.couplings[name]]
+    return found
+
+
+def mean_equations(means: Sequence[Mean], held: np.ndarray) -> list[Equation]:
+    """Return the equations of means whose nodes are held; `held`: marks of components, (n_nodes, 6)."""
+    return [
+        Equation(
+            each.card, 0, (*each.nodes.tolist(), each.node), (k,) * (len(each.nodes) + 1),
+            (*each.weights.tolist(), -1.0),
+        )
+        for each in means
+        for k in np.flatnonzero(held[each.node, :3]).tolist()
+    ]  # fmt: skip
+
+
+def shared_out(values: np.ndarray, means: Sequence[Mean]) -> np.ndarray:
+    """Return forces of nodes, (n_nodes, 6), with those of means on their nodes."""
+    if not means:
+        return values
+    result = values.copy()
+    for each in means:
+        if values[each.node, 3:].any():
+            raise each.card.error("the node of a distributing coupling takes no moments: give forces")
+        result[each.nodes, :3] += np.outer(each.weights, values[each.node, :3])
+        result[each.node] = 0.0
+    return result
+
+
+def read_points(cards: Sequence[Card], mesh: DeckMesh, large: bool) -> list[Equation]:
+    """Return the multi-point constraints of a deck as equations for small displacements."""
+    found = []
+    for card in cards:
+        for row, entries in _points_of(card) if card.name == "MPC" else ():
+            kind = entries[0].upper()
+            if kind not in _KINDS:
+                raise card.error(
+                    f"a multi-point constraint {kind} is not read: {', '.join(_KINDS)} are, which are linear "
+                    "for small displacements", row,
+                )  # fmt: skip
+            if large and kind not in ("PIN", "TIE"):
+                raise card.error(
+                    f"{kind} is not linear in displacements with NLGEOM: leave that out where displacements "
+                    "are small, or drive a rigid surface by *RIGID BODY", row,
+                )  # fmt: skip
+            nodes = np.concatenate([mesh.nodes_named(token, card, row) for token in entries[1:]])
+            if len(nodes) < _KINDS[kind]:
+                raise card.error(f"{kind} needs {_KINDS[kind]} nodes, got {len(nodes)}: complete it", row)
+            makes = {"MEANROT": _mean_rotation, "PLANE": _plane, "STRAIGHT": _straight, "BEAM": _distance}
+            rows = makes.get(kind, _distance if kind == "LINK" else _alike)(nodes, mesh.points, (card, row))
+            for own, vectors in rows:
+                node, part = np.nonzero(vectors)
+                entry = (tuple(own[node].tolist()), tuple(part.tolist()), tuple(vectors[node, part].tolist()))
+                found.append(Equation(card, row, *entry))
+    return found
+
+
+#: Kinds of multi-point constraints, and the least nodes of each.
+_KINDS = {"MEANROT": 4, "PLANE": 4, "STRAIGHT": 3, "BEAM": 2, "LINK": 2, "PIN": 2, "TIE": 2}
+#: Nodes of an equation and the vectors that their displacements are multiplied by.
+_Row: TypeAlias = tuple[np.ndarray, np.ndarray]
+
+
+def _points_of(card: Card) -> Iterator[tuple[int, list[str]]]:
+    """Yield the constraints of a card, whose lines go on where the next ones begin with a number."""
+    entries: list[str] = []
+    first = 0
+    for row, line in enumerate(card.rows):
+        own = [entry for entry in line if entry]
+        if entries and own and not own[0].isdecimal():
+            yield first, entries
+            entries = []
+        if not entries:
+            first = row
+        entries = entries + own
+    if entries:
+        yield first, entries
+
+
+def _mean_rotation(nodes: np.ndarray, points: np.ndarray, at: tuple[Card, int]) -> list[_Row]:
+    """Return the mean of the rotations of points about their centre, less that of the last node.
+
+    Each is about the axis that the coordinates of the last node give: (a × r)·(u − ū) / |r|² with the arm r
+    across the axis.
+    """
+    turned, axis = np.unique(nodes[:-1]), points[nodes[-1]]
+    if not axis.any():
+        raise at[0].error("MEANROT needs a last node whose coordinates are the axis, got zeros", at[1])
+    axis = axis / np.linalg.norm(axis)
+    arms = points[turned] - points[turned].mean(axis=0)
+    arms = arms - np.outer(arms @ axis, axis)
+    size = np.einsum("nd,nd->n", arms, arms)
+    if (size <= 1e-12 * size.max()).any():
+        raise at[0].error("MEANROT needs nodes away from the axis through their centre: leave it out", at[1])
+    vectors = np.cross(axis, arms) / size[:, None] / len(turned)
+    vectors -= vectors.mean(axis=0)
+    return [(np.append(turned, nodes[-1]), np.vstack([vectors, [-1.0, 0.0, 0.0]]))]
+
+
+def _plane(nodes: np.ndarray, points: np.ndarray, at: tuple[Card, int]) -> list[_Row]:
+    """Return that nodes stay in the plane of three that are far apart."""
+    away = np.linalg.norm(points[nodes] - points[nodes[0]], axis=1)
+    second = int(np.argmax(away))
+    along = (points[nodes[second]] - points[nodes[0]]) / max(away[second], 1e-300)
+    off = np.linalg.norm(np.cross(points[nodes] - points[nodes[0]], along), axis=1)
+    first = [0, second, int(np.argmax(off))]
+    nodes = np.concatenate([nodes[first], np.delete(nodes, first)])
+    base = points[nodes[:3]]
+    normal = np.cross(base[1] - base[0], base[2] - base[0])
+    size = np.linalg.norm(normal)
+    if size <= 1e-9 * np.ptp(base, axis=0).max() ** 2:
+        raise at[0].error("PLANE needs three nodes that are not in a line: correct the set", at[1])
+    normal /= size
+    off = np.abs((points[nodes] - base[0]) @ normal)
+    if off.max() > 1e-4 * away[second]:
+        raise at[0].error(f"PLANE needs nodes in a plane, one is {off.max():.3g} off: correct the set", at[1])
+    others = points[nodes[3:]] - base[0]
+    share = np.linalg.lstsq((base[1:] - base[0]).T, others.T, rcond=None)[0].T
+    weights = np.column_stack([1.0 - share.sum(axis=1), share])
+    return [
+        (np.append(nodes[:3], node), np.outer(np.append(-own, 1.0), normal))
+        for node, own in zip(nodes[3:], weights, strict=True)
+    ]
+
+
+def _straight(nodes: np.ndarray, points: np.ndarray, at: tuple[Card, int]) -> list[_Row]:
+    """Return that nodes stay in the line through the first two."""
+    along = points[nodes[1]] - points[nodes[0]]
+    length = np.linalg.norm(along)
+    if not length:
+        raise at[0].error("STRAIGHT needs two first nodes in different places: order them", at[1])
+    place = (points[nodes[2:]] - points[nodes[0]]) @ along / length**2
+    off = points[nodes[2:]] - points[nodes[0]] - np.outer(place, along)
+    if np.abs(off).max() > 1e-4 * length:
+        raise at[0].error(f"STRAIGHT needs nodes in a line, one is {np.abs(off).max():.3g} off", at[1])
+    across = np.linalg.svd(along[None] / length)[2][1:]
+    return [
+        (np.append(nodes[:2], node), np.outer([share - 1.0, -share, 1.0], direction))
+        for node, share in zip(nodes[2:], place, strict=True)
+        for direction in across
+    ]
+
+
+def _distance(nodes: np.ndarray, points: np.ndarray, at: tuple[Card, int]) -> list[_Row]:
+    """Return that the distance of two nodes stays."""
+    along = points[nodes[1]] - points[nodes[0]]
+    if not along.any():
+        raise at[0].error("needs two nodes in different places: take PIN", at[1])
+    return [(nodes[:2], np.outer([-1.0, 1.0], along / np.linalg.norm(along)))]
+
+
+def _alike(nodes: np.ndarray, points: np.ndarray, at: tuple[Card, int]) -> list[_Row]:
+    """Return that two nodes move alike."""
+    return [(nodes[:2], np.outer([1.0, -1.0], axis)) for axis in np.eye(3)]

@@ -1,0 +1,71 @@
+"""Forces of linear constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.by_name import ByName, names_of
+from fenics_contact.results.forces import aligned
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class ConstraintForce:
+    """A linear constraint in a state.
+
+    Attributes:
+        force: What each equation exerts where its factor is one, shape (n,), [force]: on a node of a term
+            this times c d. Equations that follow from others or from supports have none.
+        on_bodies: Body -> sum of the forces on its nodes, shape (dim,), [force].
+    """
+
+    force: np.ndarray
+    on_bodies: Mapping[str, np.ndarray]
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class ConstraintForces(ByName[ConstraintForce]):
+    """All linear constraints of a scene by their names, in its order; those of the same name are numbered."""
+
+    kind: ClassVar[str] = "constraints"
+    entries: Mapping[str, ConstraintForce]
+
+    def __str__(self) -> str:
+        """Return a table with one line for each body of each constraint."""
+        if not self.entries:
+            return "none"
+        rows: list[tuple[str, ...]] = [("", "equations", "body", "force")]
+        for name, each in self.items():
+            for body, total in each.on_bodies.items():
+                rows.append((name, str(len(each.force)), body, f"({', '.join(f'{x:.5g}' for x in total)})"))
+        return "\n".join([*aligned(rows, 3), "in [force]"])
+
+
+def constraint_forces(torn: TornSystem, multiplier: np.ndarray) -> ConstraintForces:
+    """Return what the linear constraints exert. Collective.
+
+    `multiplier`: λ, owned.
+    """
+    rows, scene = torn.constraints, torn.scene
+    if rows is None:
+        return ConstraintForces({})
+    forces, numbers = rows.forces(torn.numbering, torn.after_ties, multiplier), NodeNumbers.of(scene)
+    found = {}
+    for number, name in enumerate(names_of(scene.constraints)):
+        on_nodes = rows.on_nodes(forces, number)
+        bodies = dict.fromkeys(term.body for term in scene.constraints[number].terms)
+        totals = {}
+        for body in bodies:
+            first = numbers.first_of(body)
+            totals[body] = on_nodes[first : first + scene.bodies[body].mesh.n_nodes].sum(axis=0)
+        own = slice(int(rows.first[number]), int(rows.first[number + 1]))
+        found[name] = ConstraintForce(forces[own], totals)
+    return ConstraintForces(found)
