@@ -114,6 +114,7 @@ class Conditions:
         initial: The initial temperature of all nodes, None where it varies.
         thickness: That of a plane body where the deck has several, else None.
         dilatation: Whether cells are linear hexahedra or quadrilaterals, whose changes of volume are means.
+        expands: Whether the body is heated and some material of it expands: others then do so by zero.
     """
 
     kind: str
@@ -123,6 +124,7 @@ class Conditions:
     dilatation: bool
     thickness: float | None = None
     initial: float | None = None
+    expands: bool = False
 
 
 def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> Material:
@@ -175,7 +177,7 @@ def _row(card: Card, width: int, of: Conditions, what: str) -> list[float]:
 
 def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> list[float] | None:
     if "EXPANSION" not in parts:
-        return None
+        return [0.0] * count if of.expands else None
     card = parts["EXPANSION"]
     kind = card.name_of("TYPE") or "ISO"
     width = {"ISO": 1, "ORTHO": 3, "ANISO": 6, "ANISOTROPIC": 6}.get(kind, 0)
@@ -215,7 +217,8 @@ def _by_temperature(parts: Mapping[str, Card], of: Conditions) -> Material:
             f"constants that depend on the temperature with {what} have no counterpart: give one of them"
         )
     young, poisson = (_curve_of(card, 2, column) for column in range(2))
-    expansion, zero = None, 0.0
+    expansion: ByTemperature | None = 0.0 if of.expands else None
+    zero = 0.0
     if "EXPANSION" in parts:
         expansion, zero = _curve_of(parts["EXPANSION"], 1, 0), parts["EXPANSION"].number_of("ZERO")
     return TemperatureDependentElasticity(young, poisson, expansion, of.initial, zero)

@@ -173,8 +173,10 @@ class Model:
                 mesh.cell_type in ("hexahedron", "quadrilateral"),
                 initial=self._initial_of(part),
             )
-            given = {}
-            for region, section in regions_of(self.sections, part).items():
+            given, sections = {}, regions_of(self.sections, part)
+            expands = any(self._expands(section) for section in sections.values())
+            of = replace(of, expands=of.heated and expands)
+            for region, section in sections.items():
                 thickness = section.thickness if self._has_thicknesses else None
                 given[region] = self._material(section, replace(of, thickness=thickness))
                 self._note_units(section.card, given[region], mesh)
@@ -186,6 +188,9 @@ class Model:
             bodies[part.name] = Body(mesh, material, axisymmetric=revolved, integration=integration)
             self.origins["body", part.name] = self.sections[part.sections[0]].card.origin
         return bodies
+
+    def _expands(self, section: Section) -> bool:
+        return section.material in self.materials and "EXPANSION" in self.materials[section.material].parts
 
     def _material(self, section: Section, of: Conditions) -> Any:
         if section.material not in self.materials:

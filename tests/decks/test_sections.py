@@ -149,3 +149,16 @@ def test_initial_stresses_that_mean_nothing_are_refused(
 ) -> None:
     with pytest.raises(DeckError, match=message):
         read_deck(deck(tmp_path, BAR + FREE_TO_CONTRACT + initial(lines) + step("", large)))
+
+
+@pytest.mark.parametrize("large", ["", ", NLGEOM"])
+def test_of_two_materials_the_one_without_expansion_does_not_grow(tmp_path: Path, large: str) -> None:
+    """A bar that is free to expand: its tip moves by what one half expands."""
+    text = mesh_cards({"BAR": rectangle((0, 0), (4, 1), (4, 1))}, "CPE4")
+    for half, members, heat in (("WARM", "1, 2", "*EXPANSION\n1E-5\n"), ("COLD", "3, 4", "")):
+        text += f"*MATERIAL, NAME={half}\n*ELASTIC\n2E5, 0.\n{heat}*ELSET, ELSET={half}\n{members}\n"
+        text += f"*SOLID SECTION, ELSET={half}, MATERIAL={half}\n"
+    heated = step("*TEMPERATURE\nBAR_Y0, 100.\nBAR_Y1, 100.\n").replace("*STEP", f"*STEP{large}")
+    found = read_deck(deck(tmp_path, text + "*BOUNDARY\nBAR_X0, 1\n1, 2\n" + heated))
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-12)
+    assert state.gather_displacement("BAR")[:, 0].max() == pytest.approx(2 * 1e-5 * 100.0, rel=1e-5)
