@@ -12,7 +12,7 @@ import pytest
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar import derivatives as coupling_derivative
 from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
-from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back
+from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back, weight_derivatives
 from fenics_contact._pairing.mortar.planes import Planes
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, slopes
 from fenics_contact._surfaces.true_surface import reconstructed
@@ -221,3 +221,26 @@ def test_only_facets_beside_nodes_with_derivatives_are_integrated_again(
     assert seen[0] == np.count_nonzero((here.slave.facets == here.coupling.node[0]).any(axis=1))
     assert seen[0] < len(here.slave.facets)
     assert np.abs(found[0].points).max() > 1e-3
+
+
+@pytest.mark.parametrize("kinds", [*KINDS, *CURVED], ids="-".join)
+@pytest.mark.parametrize("past", [0.2, 1e-5], ids=["covered in part", "slivers"])
+def test_derivatives_of_all_weights_are_those_of_reverse_mode(past: float, kinds: tuple[str, str]) -> None:
+    """Where the rim of the master covers slivers of facets, modes across them are left out."""
+    low = 1 - past - 1 / 3
+    slave = plate(kinds[0], 3, height=0.01, up=False, low=low, high=low + 1, turn=1e-4, uneven=0.0)
+    master, random = plate(kinds[1], 4), np.random.default_rng(3)
+    coupling = mortar_coupling(slave, master)
+    count, nodes = len(coupling.node), (len(master.nodes), len(slave.nodes))
+    left, right = random.standard_normal((count, 2)), random.standard_normal((sum(nodes), 2))
+    by = CouplingDerivatives(
+        np.zeros(count), left, right[: nodes[0]], np.zeros((count, slave.dim)), np.zeros(count),
+        right[nodes[0] :],
+    )  # fmt: skip
+    expected = np.concatenate([side.points for side in mortar_pulled_back(slave, master, coupling, by)])
+    found = weight_derivatives(slave, master, coupling, np.ones(count, dtype=bool))
+    by_weight = np.einsum("mr,mr->m", left[found.point], right[found.node])
+    by_weight[found.node >= nodes[0]] *= -1.0  # the slave's mean is on the other side
+    np.testing.assert_allclose(
+        found.rows.T @ by_weight, expected.ravel(), rtol=0, atol=1e-8 * np.abs(expected).max()
+    )

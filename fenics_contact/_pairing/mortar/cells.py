@@ -216,6 +216,72 @@ def _half_pulled_back(cut: _Cut, by_clipped: np.ndarray) -> tuple[np.ndarray, np
     return by_vertices, by_start, over_polygons(by_end)
 
 
+def clip_slopes(subject: np.ndarray, window: np.ndarray) -> np.ndarray:
+    """Return the derivatives of the vertices that `clip` returns by the coordinates of window and subject.
+
+    The result has shape (n, vertices, dim − 1, t), the coordinates of the window's corners first.
+    """
+    (count, corners, width), own = subject.shape, window.shape[1] * window.shape[2]
+    if width == 1:
+        return _interval_slopes(subject, window)
+    slopes = np.zeros((count, corners, width, own + corners * width))
+    each = np.arange(corners * width)
+    slopes.reshape(count, corners * width, -1)[:, each, own + each] = 1.0
+    vertices, left_over = subject, np.full(count, corners)
+    for corner in range(window.shape[1]):
+        ends = corner, (corner + 1) % window.shape[1]
+        vertices, left_over, cut = _half(vertices, left_over, window[:, ends[0]], window[:, ends[1]])
+        slopes = _half_slopes(cut, slopes, ends)
+    return slopes
+
+
+def _half_slopes(cut: _Cut, slopes: np.ndarray, ends: tuple[int, int]) -> np.ndarray:
+    """Return the derivatives of the vertices after a cut along a side of the window; see `clip_slopes`.
+
+    `slopes`: those of the vertices before; `ends`: numbers of the window's corners at the side's ends.
+    """
+    row, column, place = cut.kept
+    here, is_cut = column // 2, (column % 2).astype(bool)
+    offered = slopes[row, here]
+    row_cut, here = row[is_cut], here[is_cut]
+    then = (here + 1) % cut.left.shape[1]
+    left, left_then = cut.left[row_cut, here], cut.left[row_cut, then]
+    across = np.stack([-cut.along[row_cut, 1], cut.along[row_cut, 0]], axis=1)
+
+    def of_left(number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return vertices with the derivatives of their positions beside the line."""
+        vertex, moved = cut.vertices[row_cut, number], slopes[row_cut, number]
+        change = np.einsum("na,nat->nt", across, moved)
+        away = vertex - cut.start[row_cut]
+        by_end = np.stack([away[:, 1], -away[:, 0]], axis=1)
+        for end, by in zip(ends, (-across - by_end, by_end), strict=True):
+            change[:, 2 * end : 2 * end + 2] += by
+        return vertex, change
+
+    (vertex, change), (following, change_then) = of_left(here), of_left(then)
+    # The cut is x + s (x' − x) with s = l / (l − l').
+    share, slope = left / (left - left_then), 1.0 / (left - left_then) ** 2
+    change = slope[:, None] * (left[:, None] * change_then - left_then[:, None] * change)
+    first, second = slopes[row_cut, here], slopes[row_cut, then]
+    moved = first + share[:, None, None] * (second - first)
+    offered[is_cut] = moved + (following - vertex)[:, :, None] * change[:, None]
+    clipped: np.ndarray = np.zeros((len(slopes), int(cut.count.max(initial=0)), *slopes.shape[2:]))
+    clipped[row, place] = offered
+    unused = np.arange(clipped.shape[1]) >= cut.count[:, None]
+    return np.where(unused[:, :, None, None], clipped[:, :1], clipped)
+
+
+def _interval_slopes(subject: np.ndarray, window: np.ndarray) -> np.ndarray:
+    """Return which ends of window and subject the ends of intersections are, shape (n, 2, 1, 4)."""
+    slopes = np.zeros((len(subject), 2, 1, 4))
+    for place in range(2):
+        one = np.zeros((len(subject), 2, 1))
+        one[:, place] = 1.0
+        by_subject, by_window = _interval_pulled_back(subject, window, one)
+        slopes[:, place, 0] = np.concatenate([by_window, by_subject], axis=1)[:, :, 0]
+    return slopes
+
+
 def _interval_pulled_back(
     subject: np.ndarray, window: np.ndarray, by_ends: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -359,20 +425,6 @@ class Overlaps:
         """Slave facet of each pair, shape (n_pairs,)."""
         return self.facets[self.facet]
 
-    def repeated(self, times: int) -> Overlaps:
-        """Return the overlaps several times one after the other, as those of different facets."""
-
-        def shifted(number: np.ndarray, count: int) -> np.ndarray:
-            return (count * np.arange(times)[:, None] + number).ravel()
-
-        alike = {
-            each.name: np.concatenate([getattr(self, each.name)] * times)
-            for each in fields(self)
-            if each.name not in {"facet", "pair", "degree"}
-        }
-        facet, pair = shifted(self.facet, len(self.facets)), shifted(self.pair, len(self.master))
-        return Overlaps(facet=facet, pair=pair, degree=self.degree, **alike)
-
 
 def overlaps_of(
     planes: Planes,
@@ -468,6 +520,19 @@ def cells_pulled_back(overlaps: Overlaps, cells: Cells, by: CellDerivatives) -> 
         _seen(subject), window, by_vertices.reshape(len(subject), width, pieces.shape[2])
     )
     return by_subject + _seen(by_seen), by_window + more
+
+
+def vertex_slopes(overlaps: Overlaps) -> np.ndarray:
+    """Return the derivatives of the vertices of the intersections by the flat corners of both facets.
+
+    Those of the slave facet come first, then those of the master facet, shape (n_pairs, vertices, dim − 1,
+    t).
+    """
+    subject, window = overlaps.subject, overlaps.window
+    slopes = clip_slopes(_seen(subject), window)
+    own, (count, vertices, width, total) = window[0].size, slopes.shape
+    seen = slopes[..., own:].reshape(count, vertices, width, -1, width)[..., ::-1, :]
+    return np.concatenate([slopes[..., :own], seen.reshape(count, vertices, width, total - own)], axis=3)
 
 
 def _by_local(local: np.ndarray, by_values: np.ndarray) -> np.ndarray:

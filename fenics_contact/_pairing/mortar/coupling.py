@@ -424,9 +424,11 @@ def revolved(cells: Cells, slave: FacetedSurface, facet: np.ndarray) -> Cells:
     return replace(cells, weight=2 * np.pi * cells.weight * np.einsum("nqk,nk->nq", cells.slave, radii))
 
 
-def chunks(pair_slave: np.ndarray, pair_master: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Split the list of pairs where the slave facet changes, after about `CHUNK` of them."""
+def chunks(
+    pair_slave: np.ndarray, pair_master: np.ndarray, size: int = CHUNK
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Split the list of pairs where the slave facet changes, after about ``size`` of them."""
     starts = np.flatnonzero(np.diff(pair_slave, prepend=-1))
-    cuts = starts[np.flatnonzero(np.diff(starts // CHUNK, prepend=-1))]
+    cuts = starts[np.flatnonzero(np.diff(starts // size, prepend=-1))]
     for begin, end in pairwise([*cuts, len(pair_slave)]):
         yield pair_slave[begin:end], pair_master[begin:end]

@@ -29,6 +29,7 @@ from fenics_contact._pairing.mortar.coupling import (
     relief_of_cells,
     revolved,
 )
+from fenics_contact._pairing.mortar.jacobians import MomentSlopes, NumbersOver, SharedSlopes
 from fenics_contact._pairing.mortar.planes import Planes, SumsBy, planes_of, planes_pulled_back
 from fenics_contact._pairing.mortar.traces import (
     Traces,
@@ -442,10 +443,6 @@ def revolved_pulled_back(
     return replace(by, weight=around * at_points, slave=by_slave), by_radii
 
 
-#: Pairs of facets up to which reverse mode runs for several corners and nodes at once.
-AT_ONCE = 2000
-
-
 @dataclass(frozen=True)
 class WeightDerivatives:
     """Derivatives of the weights of a coupling.
@@ -521,99 +518,59 @@ def _summed(
 
 
 def _integrals(
-    slave: FacetedSurface, master: FacetedSurface, chosen: np.ndarray
+    slave: FacetedSurface, master: FacetedSurface, chosen: np.ndarray, at_once: int = 512
 ) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
     """Return numbers, integrals and their derivatives, of facets.
 
     The number of an integral is that of its multiplier times that of all nodes, plus that of the function:
     the nodes of the master, then those of the slave.
+
+    `at_once`: pairs of facets at the same time, so that arrays stay in the cache.
     """
     width = slave.dim * (len(slave.nodes) + len(master.nodes))
-    parts = []
+    parts: list[tuple[np.ndarray, np.ndarray, sp.csr_matrix]] = []
     if len(chosen) and len(master.facets):
         planes = planes_of(slave, chosen)
-        pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
-        for pair_slave, pair_master in chunks(*pairs):
-            overlaps = overlaps_of(planes, pair_slave, pair_master, master, degree_on(slave, master))
+        pair_slave, pair_master = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
+        # Facets with about as many pairs together: all have room for as many functions.
+        order = np.argsort(np.bincount(pair_slave, minlength=len(chosen)), kind="stable")
+        planes, chosen, pair_slave = planes.part(order), chosen[order], np.argsort(order)[pair_slave]
+        by_slave = np.argsort(pair_slave, kind="stable")
+        for pairs in chunks(pair_slave[by_slave], pair_master[by_slave], at_once):
+            overlaps = overlaps_of(planes, *pairs, master, degree_on(slave, master))
             if len(overlaps.pair) == 0:
                 continue
             parts.append(_of_facets(overlaps, planes, slave, chosen, master))
     if not parts:
         return np.zeros(0, dtype=np.int64), np.zeros(0), sp.csr_matrix((0, width))
-    return _joined(parts)
+    return _summed(*(list(column) for column in zip(*parts, strict=True)))
 
 
 def _of_facets(
     overlaps: Overlaps, planes: Planes, slave: FacetedSurface, chosen: np.ndarray, master: FacetedSurface
 ) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
-    """Return the same of some overlaps that have all pairs of their slave facets.
-
-    The dual functions of a facet depend on all that covers it. So reverse mode runs once for each corner and
-    each function over a facet, in all facets at the same time; where these are few, several times at once.
-    """
-    functions = trace_nodes(master, overlaps.master)
-    if slave.whole is not None:
-        own = len(master.nodes) + trace_nodes(slave, chosen[overlaps.slave])
-        functions = np.concatenate([functions, own], axis=1)
-    over, count = _over_facets(overlaps.facet, functions), len(overlaps.master)
-    corner, number = (part.ravel() for part in np.indices((slave.facets.shape[1], over.shape[1])))
-    parts, width = [], max(1, AT_ONCE // count)
-    for begin in range(0, len(corner), width):
-        some = slice(begin, begin + width)
-        repeated = overlaps.repeated(len(corner[some]))
-        node = over[overlaps.facet][:, number[some]].T.ravel()
-        parts.append(_of_nodes(repeated, planes, slave, chosen, master, np.repeat(corner[some], count), node))
-    return _summed(*(list(column) for column in zip(*parts, strict=True)))
-
-
-def _of_nodes(
-    overlaps: Overlaps,
-    planes: Planes,
-    slave: FacetedSurface,
-    chosen: np.ndarray,
-    master: FacetedSurface,
-    corner: np.ndarray,
-    node: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
-    """Return the same for one corner and one function over each pair's slave facet, −1 for none."""
-    dim, n_slave, n_master = slave.dim, len(slave.nodes), len(master.nodes)
-    nodes, opposite = slave.facets[chosen[overlaps.slave]], master.facets[overlaps.master]
-    plain, each, both = cells_of(overlaps), np.arange(len(nodes)), (chosen[overlaps.slave], overlaps.master)
+    """Return the same of some overlaps that have all pairs of their slave facets, with repeated numbers."""
+    both = chosen[overlaps.slave], overlaps.master
+    plain = cells_of(overlaps)
     cells = revolved(plain, slave, both[0]) if slave.axisymmetric else plain
     traces, basis = Traces.of(cells, (slave, master), both), DualBasis.on(cells)
-    integrals, own = basis.integrals(traces.functions), planes.part(overlaps.slave)
-    meant = np.concatenate([traces.master, n_master + traces.slave], axis=1) == node[:, None]
-    seed = np.zeros_like(integrals)
-    seed[each, corner] = meant
-    by, by_functions = integrals_pulled_back(basis, traces.functions, np.zeros_like(basis.coverage), seed)
-    by = by.with_traces(traces.pulled_back(cells, (slave, master), both, by_functions))
-    by_radii = np.zeros(nodes.shape)
-    if slave.axisymmetric:
-        by, by_radii = revolved_pulled_back(plain, slave, both[0], by)
-    by_subject, by_window = cells_pulled_back(overlaps, plain, by)
-    places = master.points[opposite], each, by_subject
-    sides = planes_pulled_back(own, slave.points[nodes], by_window, np.zeros_like(own.normal), places)
-    sides[0][:, :, 0] += by_radii
-    slopes = np.concatenate(sides, axis=1).reshape(len(nodes), -1)
-    felt = np.flatnonzero(slopes.any(axis=1))
-    met = np.concatenate([nodes, n_slave + opposite], axis=1)[felt]
-    column = (dim * met[:, :, None] + np.arange(dim)).reshape(len(felt), slopes.shape[1])
-    entries = slopes[felt].ravel(), column.ravel(), slopes.shape[1] * np.arange(len(felt) + 1)
-    rows = sp.csr_matrix(entries, shape=(len(felt), dim * (n_slave + n_master)))
-    corner, node = corner[felt], node[felt]
-    key = nodes[felt, corner] * (n_master + n_slave) + node
-    return key, (integrals[felt, corner] * meant[felt]).sum(axis=1), rows
-
-
-def _over_facets(facet: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return the numbers of functions over each slave facet, −1 beyond their count, (n_facets, most).
-
-    `facet`: slave facet of each pair, shape (n_pairs,); `nodes`: numbers of its functions, shape (n_pairs,
-    functions).
-    """
-    count = int(nodes.max()) + 1
-    which, node = np.divmod(np.unique(facet[:, None] * count + nodes), count)
-    number = np.arange(len(which)) - np.searchsorted(which, which)
-    over = np.full((int(facet.max()) + 1, int(number.max()) + 1), -1)
-    over[which, number] = node
-    return over
+    n_slave, n_master = len(slave.nodes), len(master.nodes)
+    functions = np.concatenate([traces.master, n_master + traces.slave], axis=1)
+    met = np.concatenate([slave.facets[both[0]], n_slave + master.facets[both[1]]], axis=1)
+    over, at = NumbersOver.of(overlaps.facet, functions), NumbersOver.of(overlaps.facet, met)
+    moments = over.sums(basis.moments(traces.functions).transpose(0, 2, 1)).transpose(0, 2, 1)
+    shared = SharedSlopes.of(basis, moments)
+    slopes = MomentSlopes.of_pairs(overlaps, planes, plain, basis, traces, (slave, master), both)
+    dense = shared.of_facets(slopes, over, at)
+    # Rows by corner and function of a facet, of the coordinates of its nodes.
+    nodes = slave.facets[chosen[overlaps.facets]]
+    key = nodes[:, :, None] * (n_master + n_slave) + over.number[:, None]
+    used = np.broadcast_to((over.number >= 0)[:, None], key.shape)
+    column = slave.dim * at.number[:, :, None] + np.arange(slave.dim)
+    here = np.broadcast_to((at.number >= 0)[:, :, None], column.shape).reshape(len(nodes), -1)
+    facet = np.nonzero(used)[0]
+    kept = here[facet]
+    entries = dense[used][kept], column.reshape(len(nodes), -1)[facet][kept]
+    ends = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
+    rows = sp.csr_matrix((*entries, ends), shape=(len(facet), slave.dim * (n_slave + n_master)))
+    return key[used], (shared.functions @ moments)[used], rows

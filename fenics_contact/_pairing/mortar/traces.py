@@ -19,8 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._pairing.mortar.cells import Cells
-from fenics_contact._surfaces.facets import FacetedSurface
-from fenics_contact._surfaces.pieces import shape_weights, shape_weights_pulled_back, whole_nodes
+from fenics_contact._surfaces.facets import FacetedSurface, shape_functions
+from fenics_contact._surfaces.pieces import (
+    shape_weight_gradients,
+    shape_weights,
+    shape_weights_pulled_back,
+    whole_nodes,
+)
 
 
 def trace_nodes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
@@ -54,6 +59,18 @@ def trace_functions_pulled_back(
     at_points = np.repeat(facet, points), values.reshape(count * points, corners)
     by = by.reshape(count * points, by.shape[2])
     return shape_weights_pulled_back(surface, *at_points, by).reshape(values.shape)
+
+
+def trace_slopes(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """Return the derivatives of `trace_functions` by local coordinates of pieces, (n, q, nodes, dim − 1).
+
+    `facet`: facet of each group of points, shape (n,); `local`: coordinates on it, shape (n, q, dim − 1).
+    """
+    count, points, width = local.shape
+    values, slopes = shape_functions(local.reshape(-1, width), surface.corners)
+    if surface.whole is not None:
+        slopes = shape_weight_gradients(surface, np.repeat(facet, points), values, slopes)
+    return np.asarray(slopes.reshape(count, points, -1, width))
 
 
 @dataclass(frozen=True)
