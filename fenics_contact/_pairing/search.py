@@ -265,8 +265,7 @@ class MortarPoints:
 
         comm = comm or MPI.COMM_SELF
         coupling = mortar_coupling(slave, master, comm)
-        held = None if slave.whole is None else bearing if movable is None else movable
-        gathering = Gathering.of(coupling, slave, held)
+        gathering = Gathering.of(coupling, slave, bearing if movable is None else movable)
         if gathering is not None:
             coupling = gathering.coupling(slave, master)
         chosen = np.flatnonzero(bearing[coupling.node])
@@ -478,7 +477,9 @@ def _measured(
             one, other = ((side.surface, fixed[side.nodes]) for side in (slave, master))
             warn_of_free_master(pair, one, other, comm)
         if pair.discretisation == "mortar":
-            points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair))
+            # Of linear facets only what supports hold: a hanging node, say, moves and keeps its function.
+            free = ~fixed[slave.nodes].all(axis=1) if slave.surface.whole is None else None
+            points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair), free)
         else:
             points = _by_projection(slave, bearing, master, comm)
             if not told and may_touch(scene.bodies, pair, slave.surface).all():
@@ -547,13 +548,18 @@ def _tell_of_lost(places: np.ndarray, count: int) -> None:
 
 
 def _by_mortar(
-    slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm, share: float
+    slave: _Side,
+    bearing: np.ndarray,
+    master: _Side,
+    comm: MPI.Comm,
+    share: float,
+    movable: np.ndarray | None,
 ) -> ContactPoints:
     """Pair each slave node with the mean of the master weighted by its dual basis function. Collective.
 
-    `comm`: communicator of the ranks that share the work.
+    `bearing`, `movable`: as of `MortarPoints.of`; `comm`: communicator of the ranks that share the work.
     """
-    met = MortarPoints.of(slave.surface, master.surface, movable, share, comm)
+    met = MortarPoints.of(slave.surface, master.surface, bearing, share, comm, movable)
     coupling, nodes = met.coupling, np.concatenate([slave.nodes, master.nodes])
     count = len(nodes)
     spread = sp.csr_matrix((np.ones(count), (np.arange(count), nodes)), shape=(count, master.n_nodes))

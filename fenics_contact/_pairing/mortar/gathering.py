@@ -7,8 +7,8 @@ none, and the dual function of a neighbour becomes ψ_j + Σ_i T_ji ψ_i. All fu
 constant pressures and linear displacements stay exact, forces and moments in balance. The constraint of a
 neighbour is the mean, weighted by areas, of those that it gathers: it contains several nodes of the slave.
 
-Nodes that supports hold carry no multiplier either. Where the surfaces end there, quadratic displacements
-would be as inaccurate as linear ones without their functions.
+Nodes that supports hold carry no multiplier either. Where the surfaces end there, displacements next to them
+would have first order alone without their functions.
 """
 
 from __future__ import annotations
