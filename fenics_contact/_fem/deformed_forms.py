@@ -98,7 +98,9 @@ def _written(kind: str, materials: tuple[Material, ...], cell_type: str) -> Writ
             u=now[0], v=now[1], du=now[2], dilatation=dilatation / swelling, swelling=swelling
         )
         part = density(material, heated, constants)
-        return None if part is None else stretch ** POWERS.get(kind, 3) * on_stretched(part, cell_type)
+        # What is integrated over cells grows as the volume of a warm body does; these two are per volume.
+        power = {"cell pressure": 0, "bulk modulus": -3}.get(kind, 3)
+        return None if part is None else stretch**power * on_stretched(part, cell_type)
 
     form, constants = integrate(materials, cell_type, integrand, volume_measure(cell_type))
     coefficients = (u, means, pressures, centre)
@@ -191,5 +193,3 @@ MEAN_FORMS: dict[str, Density] = {
     "cell pressure": _pressure,
     "bulk modulus": _bulk_modulus,
 }
-#: Powers of the thermal stretch θ with which they grow, 3 for all others, as the volume of warm bodies does.
-POWERS = {"cell pressure": 0, "bulk modulus": -3}

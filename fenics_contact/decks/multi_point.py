@@ -88,19 +88,16 @@ def read_points(cards: Sequence[Card], mesh: DeckMesh, large: bool) -> list[Equa
                     "are small, or drive a rigid surface by *RIGID BODY", row,
                 )  # fmt: skip
             nodes = np.concatenate([mesh.nodes_named(token, card, row) for token in entries[1:]])
-            if len(nodes) < _KINDS[kind]:
-                raise card.error(f"{kind} needs {_KINDS[kind]} nodes, got {len(nodes)}: complete it", row)
-            makes = {"MEANROT": _mean_rotation, "PLANE": _plane, "STRAIGHT": _straight, "BEAM": _distance}
-            rows = makes.get(kind, _distance if kind == "LINK" else _alike)(nodes, mesh.points, (card, row))
-            for own, vectors in rows:
+            least, rows_of = _KINDS[kind]
+            if len(nodes) < least:
+                raise card.error(f"{kind} needs {least} nodes, got {len(nodes)}: complete it", row)
+            for own, vectors in rows_of(nodes, mesh.points, (card, row)):
                 node, part = np.nonzero(vectors)
                 entry = (tuple(own[node].tolist()), tuple(part.tolist()), tuple(vectors[node, part].tolist()))
                 found.append(Equation(card, row, *entry))
     return found
 
 
-#: Kinds of multi-point constraints, and the least nodes of each.
-_KINDS = {"MEANROT": 4, "PLANE": 4, "STRAIGHT": 3, "BEAM": 2, "LINK": 2, "PIN": 2, "TIE": 2}
 #: Nodes of an equation and the vectors that their displacements are multiplied by.
 _Row: TypeAlias = tuple[np.ndarray, np.ndarray]
 
@@ -196,3 +193,10 @@ def _distance(nodes: np.ndarray, points: np.ndarray, at: tuple[Card, int]) -> li
 def _alike(nodes: np.ndarray, points: np.ndarray, at: tuple[Card, int]) -> list[_Row]:
     """Return that two nodes move alike."""
     return [(nodes[:2], np.outer([1.0, -1.0], axis)) for axis in np.eye(3)]
+
+
+#: Kinds of multi-point constraints: the least nodes of each, and its equations.
+_KINDS = {
+    "MEANROT": (4, _mean_rotation), "PLANE": (4, _plane), "STRAIGHT": (3, _straight),
+    "BEAM": (2, _distance), "LINK": (2, _distance), "PIN": (2, _alike), "TIE": (2, _alike),
+}  # fmt: skip
