@@ -315,7 +315,8 @@ def integration_of(
             note(block.card, f"elements {element.name} are integrated in full, CalculiX takes {count} points")
         if element.variant and (element.variant != "R" or element.cell not in _REDUCED):
             plain = element.name.removesuffix(element.variant)
-            note(block.card, f"elements {element.name} are solved as {plain}, by full integration")
+            stiff = ", which bends too little: take quadratic ones" if element.variant == "I" else ""
+            note(block.card, f"elements {element.name} are solved as {plain}, by full integration{stiff}")
     found = {each.element.variant == "R" and each.element.cell in _REDUCED for each in blocks}
     if len(found) > 1:
         block = next(each for each in blocks if each.element.variant == "R")
