@@ -270,12 +270,12 @@ def _differences(matrix: sp.csr_matrix, most: int = 12) -> sp.csr_matrix:
 
 
 def independent_rows(
-    matrix: sp.csr_matrix, regular: float = 1e-13, least: float = 1e-9
+    matrix: sp.csr_matrix, regular: float = 1e-13, least: float = 1e-9, at_once: int = 256
 ) -> tuple[np.ndarray, sp.csr_matrix]:
     """Return marks of independent rows of unit length, and what of each other one they make.
 
     `regular`: added to the diagonal of the Gram matrix; `least`: pivot, the squared distance of a row from
-    those before it, below which it depends on them.
+    those before it, below which it depends on them; `at_once`: rows that are solved for together, dense.
 
     Returns shape (n,) and (n_dependent, n_independent).
     """
@@ -289,11 +289,14 @@ def independent_rows(
     if kept.all():
         return kept, sp.csr_matrix((0, count))
     factor = _factored(gram[kept][:, kept], regular)
-    right = (matrix[kept] @ matrix[~kept].T).toarray()
-    made = factor.solve(right)
-    made += factor.solve(right - gram[kept][:, kept] @ made)
-    made[np.abs(made) <= ROUNDING * np.abs(made).max(initial=0.0)] = 0.0
-    return kept, sp.csr_matrix(made.T)
+    own, right, parts = gram[kept][:, kept], (matrix[kept] @ matrix[~kept].T).tocsc(), []
+    for start in range(0, right.shape[1], at_once):
+        some = right[:, start : start + at_once].toarray()
+        made = factor.solve(some)
+        made += factor.solve(some - own @ made)
+        made[np.abs(made) <= ROUNDING * np.abs(made).max(initial=0.0)] = 0.0
+        parts.append(sp.csr_matrix(made.T))
+    return kept, sp.vstack(parts, format="csr")
 
 
 def _factored(gram: sp.csr_matrix, regular: float) -> SuperLU:
