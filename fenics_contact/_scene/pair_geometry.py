@@ -29,7 +29,7 @@ from fenics_contact._scene.supports import RigidSurface, Roller, ToolMotion
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface, gauss_points, heights, quadrature_areas
 from fenics_contact._surfaces.projection import project
-from fenics_contact.materials.elastic import PlaneStress
+from fenics_contact.materials.elastic import PlaneStress, isotropic_constants
 from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import simplices_in
@@ -130,10 +130,10 @@ def _constants(body: Body) -> tuple[float, float] | None:
     """Return Young's modulus and Poisson's ratio, the latter 0 where a thin slice strains freely."""
     constants = []
     for material in body.materials:
-        if not (hasattr(material, "young_modulus") and hasattr(material, "poisson_ratio")):
+        found = isotropic_constants(material)
+        if found is None:
             return None
-        ratio = 0.0 if isinstance(material, PlaneStress) else float(material.poisson_ratio)
-        constants.append((float(material.young_modulus), ratio))
+        constants.append((found[0], 0.0 if isinstance(material, PlaneStress) else found[1]))
     return min(constants)
 
 

@@ -14,7 +14,12 @@ from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.supports import TOOL, AnySupport, ToolMotion
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.materials.elastic import IsotropicElasticity, Material, PlaneStrain
+from fenics_contact.materials.elastic import (
+    IsotropicElasticity,
+    Material,
+    PlaneStrain,
+    isotropic_constants,
+)
 from fenics_contact.materials.hyperelastic import StVenantKirchhoff
 from fenics_contact.materials.kernels import motions_about
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -176,7 +181,8 @@ def with_tool_parts(
 
 def _material(slave: Body, much: bool) -> Material:
     """Return a material of about the stiffness of a body, in which rotations cause no stress where large."""
-    young = min((float(getattr(each, "young_modulus", 1.0)) for each in slave.materials), default=1.0)
+    known = [isotropic_constants(each) or (1.0, 0.3) for each in slave.materials]
+    young = min((young for young, _ in known), default=1.0)
     if much:
         return StVenantKirchhoff(young, 0.3)
     solid = slave.mesh.dim == 3 or slave.axisymmetric

@@ -21,6 +21,7 @@ from fenics_contact.decks.initial_stress import read_initial
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
 from fenics_contact.decks.multi_point import mean_equations, read_means, read_points, shared_out
 from fenics_contact.decks.regions import split_sections
+from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.readers.deck_bodies import (
     Component,
@@ -212,8 +213,8 @@ class Model:
 
         `gigapascals`: the range of metals, in which plastics and rubber in N/mm² hardly are.
         """
-        given, size = getattr(material, "young_modulus", 0.0), float(np.ptp(mesh.points, axis=0).max())
-        young = given if isinstance(given, float) else given[0][1]
+        young, _ = isotropic_constants(material) or (0.0, 0.0)
+        size = float(np.ptp(mesh.points, axis=0).max())
         low, high = gigapascals
         if low <= young <= high and size >= 50.0:
             self.note(

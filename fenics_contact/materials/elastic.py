@@ -40,6 +40,15 @@ def check_expansion(thermal_expansion: float | None) -> None:
         )
 
 
+def isotropic_constants(material: object) -> tuple[float, float] | None:
+    """Return E and ν of an isotropic material at its initial temperature, None if it has none."""
+    constants = getattr(material, "at_rest", None)
+    if constants is None:
+        constants = getattr(material, "young_modulus", None), getattr(material, "poisson_ratio", None)
+    young, poisson = constants
+    return (float(young), float(poisson)) if young is not None and poisson is not None else None
+
+
 def lame(young_modulus: float, poisson_ratio: float) -> tuple[float, float]:
     """Return the first Lamé parameter λ and the shear modulus G, [force / length²]."""
     E, nu = young_modulus, poisson_ratio

@@ -75,6 +75,12 @@ class TemperatureDependentElasticity(HistoryMaterial):
                 )
 
     @property
+    def at_rest(self) -> tuple[float, float]:
+        """E and ν at the initial temperature."""
+        start = np.array(self.initial_temperature)
+        return float(_at(self.young_modulus, start)), float(_at(self.poisson_ratio, start))
+
+    @property
     def expands(self) -> bool:
         """Yes: temperatures strain it."""
         return True

@@ -116,6 +116,22 @@ def test_a_hot_block_presses_on_walls_with_the_stiffness_that_it_has() -> None:
     assert force == pytest.approx(120.0 * (free - 0.01), rel=1e-6)
 
 
+def test_two_hot_blocks_press_on_each_other_across_meshes_that_do_not_match() -> None:
+    """E(T) ε_th between two walls; by mortar, whose measure is of both bodies' constants at rest."""
+    material = TemperatureDependentElasticity(YOUNG, 0.0, EXPANSION, 40.0, 10.0)
+    low, high = block((0, 0, 0), (1, 1, 1), (2, 2, 2)), block((0, 0, 1), (1, 1, 2), (3, 3, 2))
+    bodies = {"low": Body(low, material), "high": Body(high, material)}
+    supports = [
+        Support(body, f"{a}0", tuple(0.0 if a == b else None for b in "xyz")) for body in bodies for a in "xy"
+    ]
+    walls = [Support("low", "z0", (None, None, 0.0)), Support("high", "z1", (None, None, 0.0))]
+    pair = ContactPair(Surface("low", "z1"), Surface("high", "z0"))
+    loads = [ThermalStrain(body, 60.0) for body in bodies]
+    state = solve_scene(Scene(bodies, [*supports, *walls], loads, [pair]), MPI.COMM_SELF, tolerance=1e-10)
+    free = float(material.free_strain(np.array([60.0]))[0])
+    np.testing.assert_allclose(state.contact.pressure, 120.0 * free, rtol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
