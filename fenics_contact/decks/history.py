@@ -495,4 +495,11 @@ def _step(
     large = bool(before) and before[-1].large
     if "NLGEOM" in head.parameters:
         large = plain(head.parameters["NLGEOM"]) in ("", "YES")
-    return Step(head, f"step {len(before) + 1}", large, moments), start + period
+    return Step(head, _name(head, before), large, moments), start + period
+
+
+def _name(head: Card, before: Sequence[Step]) -> str:
+    name = head.name_of("NAME") or f"step {len(before) + 1}"
+    if any(each.name == name for each in before):
+        raise head.error(f"a step before it has the name {name!r}, too: give it another one")
+    return name

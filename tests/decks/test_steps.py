@@ -156,3 +156,13 @@ def test_numbers_of_bubbles_behind_the_nodes_of_an_element_are_overlooked(tmp_pa
         for k, each in enumerate((text, head + "ELSET=BAR\n" + "\n".join(more)))
     )
     np.testing.assert_array_equal(one.cells, other.cells)
+
+
+def test_steps_have_the_names_that_the_deck_gives_them(tmp_path: Path) -> None:
+    text = BAR + FREE_TO_CONTRACT + step("").replace("*STEP", "*STEP, NAME=press") + step("")
+    found = read_deck(deck(tmp_path, text))
+    assert [each.name for each in found.steps] == ["PRESS", "step 2"]
+    assert found.source("step", "PRESS").line == text[: text.index("*STEP")].count("\n") + 1
+    twice = text.replace("*STEP\n", "*STEP, NAME=Press\n")
+    with pytest.raises(DeckError, match=r"\*STEP: a step before it has the name 'PRESS', too"):
+        read_deck(deck(tmp_path, twice))
