@@ -66,14 +66,14 @@ def stick_area(state: State, pair: int | str = 0) -> float:
 
 def _area(state: State, surface: _SlaveSurface) -> float:
     """Return the area within the rim."""
-    total = 0.0
+    total, facing = 0.0, np.where(surface.given, 0.0, surface.facing)
     for corners, weight in _simplices(surface.facets.shape[1]):
         facets = surface.facets[:, corners]
         edges = surface.places[facets[:, 1:]] - surface.places[facets[:, :1]]
         gram = np.linalg.det(edges @ np.swapaxes(edges, 1, 2))
         size = np.sqrt(np.maximum(gram, 0.0)) / (len(corners) - 1)
         share = surface.closed_share(facets)
-        size = size * surface.facing[facets].mean(axis=1)
+        size = size * facing[facets].mean(axis=1)
         if state.scene.axisymmetric:
             size = size * _circumference(surface.places[facets, 0], surface.closed[facets], share)
         total += weight * float(size @ share)
@@ -119,7 +119,8 @@ class _SlaveSurface:
         pressure: Of closed nodes, zero at open ones, shape (n,).
         spread: E* times the gap of open nodes, shape (n,).
         facing: Share of each node's area that faces the master, zero at nodes without a contact point, (n,).
-        beyond: How far contact reaches on the way to such nodes, relative to their distance.
+        given: Marks of nodes whose area is among those of their neighbours, shape (n,).
+        beyond: How far contact reaches on the way to nodes without a contact point, relative to the distance.
     """
 
     places: np.ndarray
@@ -127,6 +128,7 @@ class _SlaveSurface:
     pressure: np.ndarray
     spread: np.ndarray
     facing: np.ndarray
+    given: np.ndarray
     beyond: float
 
     @cached_property
@@ -200,8 +202,9 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
     places = surface.points
     if scene.bodies[slave.body].deforms_much:
         places = places + state.gather_displacement(slave.body)[surface.nodes]
-    # Nodes that supports hold have no contact point either.
+    # Nodes that supports hold have no contact point either; by mortar their neighbours have their areas.
     held = scene.fixed(slave.body)[surface.nodes].all(axis=1)
+    given = held & by_mortar
     facing = held.astype(float)
     facing[place] = 1.0
     if by_mortar:
@@ -216,7 +219,7 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
     if scene.axisymmetric and not by_mortar:
         facing = np.clip(filled_on_axis(whole, facing, on_axis), 0.0, 1.0)
     facets, beyond = surface.facets[:, : surface.corners], 0.0 if by_mortar else 0.5
-    return _SlaveSurface(places, facets, pressure, spread, facing, beyond)
+    return _SlaveSurface(places, facets, pressure, spread, facing, given, beyond)
 
 
 def _circumference(radii: np.ndarray, closed: np.ndarray, share: np.ndarray) -> np.ndarray:

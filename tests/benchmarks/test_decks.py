@@ -75,7 +75,7 @@ def test_result_files_are_read() -> None:
 def test_decks_are_asked_for_all_displacements_and_solved_to_the_end() -> None:
     asked = with_requests("*ELEMENT, TYPE=CAX8\n*STATIC,SOLVER=ITERATIVE SCALING\n*End Step\n", True)
     assert asked.splitlines()[1:] == [
-        "*STATIC", "*NODE FILE,FREQUENCY=99999,OUTPUT=2D", "U,RF",
+        "*STATIC", "*NODE FILE,FREQUENCY=99999,GLOBAL=YES,OUTPUT=2D", "U,RF",
         "*CONTROLS,PARAMETERS=FIELD", "1.E-5,1.E-5", "*End Step",
     ]  # fmt: skip
 

@@ -559,11 +559,15 @@ def test_a_failure_leaves_the_last_answer() -> None:
     assert problem.state is state
 
 
-def test_other_supported_components_than_those_of_the_first_scene_are_refused() -> None:
-    problem = posed()
-    problem.solve()
-    with pytest.raises(InvalidInputError, match="support"):
-        problem.solve(replace(SCENE, supports=[*SCENE.supports, Support("block", "z1")]))
+def test_other_supports_than_those_of_the_first_scene_are_other_rows_of_the_same_subdomains() -> None:
+    problem, held = posed(), replace(SCENE, supports=[*SCENE.supports, Support("block", "z1")])
+    first = problem.solve()
+    again = problem.solve(held)
+    known = solve_scene(held, MPI.COMM_WORLD)
+    np.testing.assert_allclose(
+        again.gather_displacement("block"), known.gather_displacement("block"), atol=1e-4
+    )
+    assert again.torn.decomposition is not first.torn.decomposition
 
 
 def test_a_problem_that_follows_a_state_goes_on_from_it() -> None:
