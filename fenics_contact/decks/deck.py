@@ -157,8 +157,8 @@ def read_deck(path: str | Path, comm: MPI.Comm | None = None, *, statics_only: b
     Args:
         path: The file, mostly ``.inp``; files that it includes are looked for in its folder.
         comm: If given, rank 0 reads the file and all ranks receive the deck.
-        statics_only: Whether the first step of another procedure, such as *FREQUENCY, or of a perturbation,
-            and all steps behind it are left out, which `Deck.notes` say. Else they are refused.
+        statics_only: Whether the first step of another procedure, such as ``*FREQUENCY``, or of a
+            perturbation, and all steps behind it are left out, which `Deck.notes` say. Else they are refused.
 
     Raises:
         DeckError: With card and line, if a card, an element, a set or a parameter is not known or does not
