@@ -15,7 +15,7 @@ from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import AnySupport, RigidSurface
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.feti.constraints import ConstraintRows
 from fenics_contact.feti.contact_rows import Relations
 from fenics_contact.feti.decomposition import Tearing
@@ -156,18 +156,43 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
         along[own] = modes
         along = (along if axes is None else axes.to_local(along))[own]
         _require_room(surface, along, ~np.isnan(prescribed[own]), mesh.points[own])
-        basis, scale = np.linalg.qr(modes.reshape(-1, modes.shape[2]))
+        basis, load = _independent(surface, modes.reshape(-1, modes.shape[2]))
         node, component = np.indices(modes.shape[:2]).reshape(2, -1)
         row = tearing.global_nodes(surface.body, own)[node] * scene.components + component
         place = np.broadcast_to(np.arange(basis.shape[1]), basis.shape)
         entries = (basis.ravel(), (np.repeat(row, basis.shape[1]), place.ravel()))
         columns.append(sp.csr_matrix(entries, shape=(size, basis.shape[1])))
-        loads.append(np.linalg.solve(scale.T, surface.load[surface.free]))
+        loads.append(load)
     if not columns:
         return FreeMotions(sp.csr_matrix((size, 0)), np.zeros(0))
     joined = sp.hstack(columns, format="csr")
     _require_flexible_slaves(scene, tearing, _moving(joined, (tearing.n_nodes, scene.components)))
     return FreeMotions(joined, np.concatenate(loads))
+
+
+def _independent(
+    surface: RigidSurface, modes: np.ndarray, near: float = 1e-9
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return orthonormal motions of nodes, (n, k), and the load on each, (k,).
+
+    Nodes in a line are not moved by turning about it: that motion is left out.
+
+    `modes`: motions of nodes by free components, (n, m); `near`: singular value, relative to the largest, of
+    what moves no node, and share of the load on it that is rounding.
+    """
+    load = surface.load[surface.free]
+    basis, scale = np.linalg.qr(modes)
+    left, size, turned = np.linalg.svd(scale)
+    moves = size > near * size.max()
+    if moves.all():
+        return basis, np.linalg.solve(scale.T, load)
+    along = turned @ load
+    if np.abs(along[~moves]).max() > near * np.abs(load).max():
+        raise InfeasibleError(
+            f"the moment on rigid surface {surface.surface!r} of body {surface.body!r} turns about the line "
+            "of its nodes, which moves none of them: name nodes that are not in a line, or leave it out"
+        )
+    return basis @ left[:, moves], along[moves] / size[moves]
 
 
 def _require_flexible_slaves(scene: Scene, tearing: Tearing, moving: np.ndarray) -> None:

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact import CyclicSymmetry, RigidSurface, read_scene_file
 from fenics_contact.decks import DeckError, read_deck, write_scene_file
+from fenics_contact.errors import InfeasibleError
 from fenics_contact.gallery import block
 from tests.decks.texts import FIXED, SECTION, STEEL, deck, mesh_cards, step
 from tests.decks.texts import PLAIN_BAR as BAR
@@ -91,6 +92,9 @@ def test_a_set_of_nodes_moves_as_one_rigid_piece(tmp_path: Path) -> None:
     files = write_scene_file(found, tmp_path / "scene.toml")
     again = read_scene_file(files[0], MPI.COMM_SELF, overrides=["solver.tolerance=1e-10"]).solve()
     np.testing.assert_allclose(again.gather_displacement("BAR"), state.gather_displacement("BAR"), atol=1e-9)
+    about = "".join(f"502, {k + 1}, {arm[k]}\n" for k in range(3))
+    with pytest.raises(InfeasibleError, match="turns about the line of its nodes, which moves none of them"):
+        solved(tmp_path, BAR + rigid + FIXED + step(f"*CLOAD\n{about}"))
 
 
 COUPLED = "*ELEMENT, TYPE=DCOUP3D, ELSET=E1\n99, 700\n"
