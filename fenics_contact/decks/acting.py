@@ -43,12 +43,7 @@ class Acting:
 
     def name_surfaces(self) -> None:
         """Name the faces that pressures act on."""
-        acting = [
-            pressed
-            for step in self.model.history.steps
-            for moment in step.moments
-            for pressed in moment.pressures
-        ]
+        acting = [pressed for moment in self.model.history.moments for pressed in moment.pressures]
         sides: dict[str, Pressed] = {}
         taken: dict[tuple[int, int], str] = {}
         for pressed in acting:

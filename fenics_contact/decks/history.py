@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -397,6 +398,11 @@ class History:
     targets: Sequence[Held]
     prints: Sequence[tuple[int, Card]]
     initial: np.ndarray
+
+    @cached_property
+    def moments(self) -> Sequence[Moment]:
+        """What acts at all times of all steps, in their order."""
+        return [moment for step in self.steps for moment in step.moments]
 
 
 def read_history(cards: Sequence[Card], mesh: DeckMesh) -> History:

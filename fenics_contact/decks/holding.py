@@ -77,7 +77,7 @@ class Holding:
         """Reject nodes that drive rigid surfaces and are fixed where their motion was free before."""
         driving = {node for driven in self.model.driven for node in (driven.node, driven.turning)}
         here = [node for node in target.nodes.tolist() if node in driving]
-        moments = [moment for step in self.model.history.steps for moment in step.moments]
+        moments = self.model.history.moments
         if any(moment.kept[node, list(target.components)].any() for moment in moments for node in here):
             raise target.card.error(
                 f"node {self.model.mesh.numbers[here[0]]}, which drives a surface, was free before it is "
@@ -88,7 +88,7 @@ class Holding:
         """Reject rotations of nodes of elements, which have none, unless they are held at zero."""
         turned = [k for k in target.components if k > 2]
         free = nodes[~np.isin(nodes, self.model.references)]
-        moments = [moment for step in self.model.history.steps for moment in step.moments]
+        moments = self.model.history.moments
         if turned and any(np.nan_to_num(moment.held[free][:, turned]).any() for moment in moments):
             name = target.label or self.model.mesh.numbers[free[0]]
             raise target.card.error(
@@ -164,7 +164,7 @@ class Holding:
 
     def _always_zero(self, nodes: np.ndarray, held: Sequence[int]) -> bool:
         """Return whether components of nodes are held at zero in all steps."""
-        moments = [moment for step in self.model.history.steps for moment in step.moments]
+        moments = self.model.history.moments
         held = list(held)
         return not any(
             np.nan_to_num(moment.held[nodes][:, held]).any() or moment.kept[nodes][:, held].any()
@@ -247,8 +247,7 @@ class Holding:
             if not inside[at].any():
                 raise each.card.error("needs a node of an element, this equation has none: add one", each.row)
             for node, component in zip(at[~inside[at]], np.array(each.components)[~inside[at]], strict=True):
-                moments = [m for step in self.model.history.steps for m in step.moments]
-                if any(np.isnan(moment.held[node, component]) for moment in moments):
+                if any(np.isnan(moment.held[node, component]) for moment in self.model.history.moments):
                     raise each.card.error(
                         f"node {self.model.mesh.numbers[node]} belongs to no element, its component "
                         f"{component + 1} in an equation must have a value in all steps: give it by "

@@ -65,7 +65,7 @@ class Model:
         self.bolts = read_bolts(cards, self.mesh)
         self.means = read_means(cards, self.mesh)
         large = any(step.large for step in self.history.steps)
-        held = [~np.isnan(moment.held) for step in self.history.steps for moment in step.moments]
+        held = [~np.isnan(moment.held) for moment in self.history.moments]
         self.equations = [
             *read_equations(cards, self.mesh),
             *read_points(cards, self.mesh, large),
@@ -81,7 +81,7 @@ class Model:
 
     def _split(self) -> None:
         """Cut sections where a part of them is loaded."""
-        weights = [w for step in self.history.steps for moment in step.moments for w in moment.weights]
+        weights = [w for moment in self.history.moments for w in moment.weights]
         loaded = {w.where: self.mesh.elements_named(w.where, w.card, w.row) for w in weights}
         self.mesh, self.sections, self.of_element, self.parts_of_mesh = split_sections(
             self.mesh, self.sections, self.of_element, self.parts_of_mesh, loaded.items()
@@ -163,14 +163,14 @@ class Model:
         if large and not all(step.large for step in self.history.steps):
             step = next(step for step in self.history.steps if not step.large)
             raise step.card.error("all steps must have NLGEOM, or none, got both: give it to this one, too")
-        bodies = {}
+        bodies, temperature, heated = {}, self._temperature(), self._heated()
         for part in self.parts_of_mesh:
             mesh = self.parts.meshes[part.name]
             of = Conditions(
                 self.kind,
                 large,
-                self._temperature(),
-                self._heated(),
+                temperature,
+                heated,
                 mesh.cell_type in ("hexahedron", "quadrilateral"),
                 initial=self._initial_of(part),
             )
@@ -231,10 +231,9 @@ class Model:
 
     def _heated(self) -> bool:
         """Return whether the temperature of any node changes."""
-        moments = [moment for step in self.history.steps for moment in step.moments]
         return any(
             moment.temperatures is not None and bool((moment.temperatures != self.history.initial).any())
-            for moment in moments
+            for moment in self.history.moments
         )
 
     def _initial_of(self, part: Component) -> float | None:
@@ -246,10 +245,9 @@ class Model:
     def _temperature(self) -> float | None:
         """Return the temperature if it is the same everywhere and always."""
         found = {float(t) for t in np.unique(self.history.initial)}
-        for step in self.history.steps:
-            for moment in step.moments:
-                if moment.temperatures is not None:
-                    found |= {float(t) for t in np.unique(moment.temperatures)}
+        for moment in self.history.moments:
+            if moment.temperatures is not None:
+                found |= {float(t) for t in np.unique(moment.temperatures)}
         return found.pop() if len(found) == 1 else None
 
     def nodes_of_bodies(self) -> np.ndarray:
