@@ -28,6 +28,7 @@ PRINT_CARDS = {"NODEPRINT", "ELPRINT", "CONTACTPRINT", "NODEFILE", "ELFILE", "CO
 WITHOUT_EFFECT = {
     "HEADING": "a title",
     "PREPRINT": "output",
+    "PRINT": "output",
     "OUTPUT": "output",
     "NODEOUTPUT": "output",
     "ELEMENTOUTPUT": "output",
@@ -100,9 +101,9 @@ PARAMETERS: dict[str, set[str]] = {
     "CHANGESURFACEBEHAVIOR": {"INTERACTION"},
     "MODELCHANGE": {"TYPE", "REMOVE", "ADD"},
     "STATIC": {"DIRECT", "SOLVER"},
-    "BOUNDARY": {"OP", "AMPLITUDE", "TIMEDELAY", "FIXED", "TYPE"},
-    "CLOAD": {"OP", "AMPLITUDE", "TIMEDELAY"},
-    "DLOAD": {"OP", "AMPLITUDE", "TIMEDELAY"},
-    "DSLOAD": {"OP", "AMPLITUDE", "TIMEDELAY"},
-    "TEMPERATURE": {"OP", "AMPLITUDE", "TIMEDELAY"},
+    "BOUNDARY": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "FIXED", "TYPE"},
+    "CLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
+    "DLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
+    "DSLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
+    "TEMPERATURE": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
 }

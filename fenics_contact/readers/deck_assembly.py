@@ -234,7 +234,7 @@ def _of_instance(card: Card, instance: _Instance, instances: Instances) -> Card:
             instance.require_plane(card)
         return _Placed(
             card.name, card.written, parameters, card.lines, card.numbers, card.line, card.file,
-            instance=instance, offset=offset,
+            files=card.files, instance=instance, offset=offset,
         )  # fmt: skip
     lines = card.lines
     if card.name in ("NSET", "ELSET", "SURFACE"):

@@ -357,7 +357,7 @@ def _read(path: Path) -> dict[str, BodyMesh]:
     surfaces = {}
     for name, given in mesh.surfaces.items():
         faces = exterior.faces_of(given)
-        if faces is not None and exterior.holds(faces).all():
+        if faces is not None and len(faces) and exterior.holds(faces).all():
             surfaces[name] = faces
     parts = components(mesh, sections, of_element)
     sets = {name: nodes for name, nodes in mesh.node_sets.items() if name not in surfaces}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -87,8 +87,9 @@ class Card:
         name: The keyword in capitals without blanks: "SOLIDSECTION".
         parameters: Names in capitals without blanks -> values as written, "" for flags.
         lines: Data lines without comments and blank lines.
-        first: Number of the line behind the keyword, and which of these are data lines.
+        numbers: Numbers of the data lines in their files.
         instances: Those of the deck; None without any.
+        files: Names of the files of the data lines, where not all are of that of the keyword.
     """
 
     name: str
@@ -99,6 +100,7 @@ class Card:
     line: int
     file: str
     instances: Instances | None = None
+    files: Sequence[str] = ()
 
     @property
     def body(self) -> str:
@@ -119,7 +121,10 @@ class Card:
 
     def error(self, words: str, row: int | None = None) -> DeckError:
         """Return an error at the keyword, or at a data line, numbered from 0."""
-        return self.origin.error(words, 0 if row is None else self.numbers[row])
+        if row is None:
+            return self.origin.error(words)
+        origin = replace(self.origin, file=self.files[row]) if self.files else self.origin
+        return origin.error(words, self.numbers[row])
 
     def name_of(self, parameter: str) -> str:
         """Return the name that a parameter gives, in capitals, "" without it."""
@@ -243,15 +248,48 @@ def whole_numbers(card: Card) -> np.ndarray:
 
 #: Most files that include each other, one inside the other.
 DEEPEST = 20
+#: Parameters without a value, with which a keyword that ends with a comma may go on in its next line.
+_FLAGS = {
+    "GENERATE", "UNSORTED", "INTERNAL", "NLGEOM", "PERTURBATION", "DIRECT", "FIXED", "REMOVE", "ADD", "USER",
+    "SMALLSLIDING", "CYCLICSYMMETRY", "READ", "WRITE", "OGDEN", "MOONEY-RIVLIN", "NEOHOOKE", "YEOH",
+    "POLYNOMIAL", "REDUCEDPOLYNOMIAL", "ARRUDA-BOYCE",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """A keyword and the data lines behind it in its file, or, without one, data of the card before.
+
+    Attributes:
+        line: Number of the line of the keyword, 0 without one.
+        numbers: Numbers of the data lines.
+    """
+
+    keyword: str
+    line: int
+    file: str
+    lines: Sequence[str]
+    numbers: Sequence[int]
 
 
 def cards_of(path: Path) -> list[Card]:
-    """Return the cards of a deck and of the files that it includes, in their order."""
-    return list(_cards(path, path.parent, ()))
+    """Return the cards of a deck; the text of a file that it includes is in the place of *INCLUDE."""
+    parts: list[list[_Stretch]] = []
+    for stretch in _stretches(path, path.parent, ()):
+        if stretch.keyword:
+            parts.append([stretch])
+        elif stretch.lines and parts:
+            parts[-1].append(stretch)
+        elif stretch.lines:
+            raise DeckError(
+                f"data must follow a card, got {stretch.lines[0].strip()[:40]!r}",
+                stretch.file, stretch.numbers[0],
+            )  # fmt: skip
+    return [_card(stretches) for stretches in parts]
 
 
-def _cards(path: Path, folder: Path, inside: tuple[Path, ...]) -> Iterator[Card]:
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+def _stretches(path: Path, folder: Path, inside: tuple[Path, ...]) -> Iterator[_Stretch]:
+    lines = [line.lstrip() for line in path.read_text("utf-8-sig", errors="replace").splitlines()]
     heads = [k for k, line in enumerate(lines) if line[:1] == "*" and line[:2] != "**"]
     if not heads and not inside:
         raise DeckError(
@@ -259,39 +297,85 @@ def _cards(path: Path, folder: Path, inside: tuple[Path, ...]) -> Iterator[Card]
             "file of CalculiX or Abaqus?",
             path.name,
         )
-    before = [k for k in range(heads[0] if heads else len(lines)) if _is_data(lines[k])]
-    if before and not inside:
+    yield _stretch("", lines, -1, 0, heads[0] if heads else len(lines), path.name)
+    for head, end in zip(heads, [*heads, len(lines)][1:], strict=True):
+        keyword, start = _keyword(lines, head, end)
+        found = _stretch(keyword, lines, head, start, end, path.name)
+        if keyword == "*":
+            found = _without_keyword(found)
+        elif _name(keyword) == "INCLUDE":
+            yield from _included(_card([found]), folder, (*inside, path))
+            found = replace(found, keyword="")
+        yield found
+
+
+def _stretch(keyword: str, lines: Sequence[str], head: int, start: int, end: int, file: str) -> _Stretch:
+    inner = [k for k in range(start, end) if _is_data(lines[k])]
+    return _Stretch(keyword, head + 1, file, [lines[k] for k in inner], [k + 1 for k in inner])
+
+
+def _without_keyword(stretch: _Stretch) -> _Stretch:
+    """Take an asterisk alone for a comment, which data cannot follow."""
+    if stretch.lines:
         raise DeckError(
-            f"data must follow a card, got {lines[before[0]].strip()[:40]!r}", path.name, before[0] + 1
-        )
-    for head, end in zip(heads, [*heads[1:], len(lines)], strict=True):
-        keyword, start = lines[head].rstrip(), head + 1
-        while keyword.endswith(",") and start < end:
-            keyword, start = keyword + lines[start].strip(), start + 1
-        inner = [k for k in range(start, end) if _is_data(lines[k])]
-        card = _card(keyword, [lines[k] for k in inner], [k + 1 for k in inner], head + 1, path.name)
-        if card.name == "INCLUDE":
-            yield from _included(card, folder, (*inside, path))
-        else:
-            yield card
+            "data cannot follow an asterisk alone, which is no card: name one, or write ** for a comment",
+            stretch.file, stretch.numbers[0],
+        )  # fmt: skip
+    return replace(stretch, keyword="")
+
+
+def _keyword(lines: Sequence[str], head: int, end: int) -> tuple[str, int]:
+    """Return a keyword with its parameters, without a comment, and the first line behind it.
+
+    After a comma at its end the next line goes on with it if a parameter is there; if data are, it does not.
+    """
+    keyword, place = _bare(lines[head]), head + 1
+    while keyword.endswith(",") and place < end:
+        more = _bare(lines[place])
+        first, equals, _ = more.partition(",")[0].partition("=")
+        if more and not equals and _squeezed(first) not in _FLAGS:
+            break
+        keyword, place = keyword + more, place + 1
+    return keyword, place
+
+
+def _bare(line: str) -> str:
+    return line.partition("**")[0].strip()
+
+
+def _squeezed(text: str) -> str:
+    return "".join(text.split()).upper()
+
+
+def _name(keyword: str) -> str:
+    return _squeezed(keyword[1:].partition(",")[0])
 
 
 def _is_data(line: str) -> bool:
-    return line[:2] != "**" and not line.isspace() and bool(line)
+    return line[:2] != "**" and bool(line)
 
 
-def _card(keyword: str, lines: list[str], numbers: list[int], line: int, file: str) -> Card:
-    written, *rest = keyword[1:].split(",")
+def _card(stretches: Sequence[_Stretch]) -> Card:
+    """Return the card of a keyword with the data behind it, of one file or of several."""
+    first = stretches[0]
+    written, *rest = first.keyword[1:].split(",")
     parameters = {}
     for part in rest:
         name, _, value = part.partition("=")
         if name.strip():
-            parameters[name.replace(" ", "").replace("\t", "").upper()] = value.strip()
+            parameters[_squeezed(name)] = value.strip()
     shown = " ".join(written.split()).upper()
-    return Card(shown.replace(" ", ""), visible(shown), parameters, lines, numbers, line, file)
+    if shown.startswith("HEADING "):  # a title in the line of the keyword
+        shown, parameters = "HEADING", {}
+    lines = [line for each in stretches for line in each.lines]
+    numbers = [number for each in stretches for number in each.numbers]
+    files = [each.file for each in stretches for _ in each.lines] if len(stretches) > 1 else ()
+    return Card(
+        _squeezed(shown), visible(shown), parameters, lines, numbers, first.line, first.file, files=files
+    )
 
 
-def _included(card: Card, folder: Path, inside: tuple[Path, ...]) -> Iterator[Card]:
+def _included(card: Card, folder: Path, inside: tuple[Path, ...]) -> Iterator[_Stretch]:
     given = card.parameters.get("INPUT", "").strip().strip('"')
     if not given:
         raise card.error(f"needs the parameter INPUT=, got {card.given}: name the file")
@@ -302,4 +386,4 @@ def _included(card: Card, folder: Path, inside: tuple[Path, ...]) -> Iterator[Ca
         require_file(path, "an included file")
     except InvalidInputError as error:
         raise card.error(str(error)) from error
-    yield from _cards(path, folder, inside)
+    yield from _stretches(path, folder, inside)

@@ -43,6 +43,9 @@ class Faces:
         return len(self.elements)
 
 
+NO_FACES = Faces(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+
+
 @dataclass(frozen=True, eq=False)
 class Named:
     """A surface by its card: faces of elements, or nodes."""
@@ -50,6 +53,11 @@ class Named:
     card: Card
     faces: Faces | None
     nodes: np.ndarray | None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether its card has no lines, as of surfaces that nothing uses."""
+        return not (self.faces if self.nodes is None else self.nodes.tolist())
 
 
 @dataclass(eq=False)
@@ -102,8 +110,11 @@ class DeckMesh:
         return _known(self.element_sets, token, "element set", card, row)
 
     def surface_named(self, token: str, card: Card, row: int | None = None) -> Named:
-        """Return a surface."""
-        return _known(self.surfaces, token, "surface", card, row)
+        """Return a surface, which has faces or nodes."""
+        found = _known(self.surfaces, token, "surface", card, row)
+        if found.is_empty:
+            raise card.error(f"surface {plain(token)!r} has no lines: add its faces or nodes", row)
+        return found
 
     def positions(
         self, numbers: np.ndarray, what: str, card: Card, row: int | None = None, by_row: bool = False
@@ -317,14 +328,12 @@ def _surface(mesh: DeckMesh, card: Card) -> Named:
                 f"needs a face S1, S2, ... behind the elements, got {label or 'nothing'!r}: add it", k
             )
         parts.append(mesh.faces_of(elements, label, card, k))
-    if not parts:
-        raise card.error("needs a line for each set of elements and its face, it has none: add them")
     return Named(card, joined(parts), None)
 
 
 def joined(parts: Iterable[Faces]) -> Faces:
     """Return faces of several parts, each once."""
-    parts = list(parts)
+    parts = [NO_FACES, *parts]
     rows = np.column_stack(
         [np.concatenate([each.elements for each in parts]), np.concatenate([each.sides for each in parts])]
     )

@@ -131,7 +131,7 @@ WRONG = [
         "*AMPLITUDE",
         r"needs pairs of a time and a value, got 3 numbers",
     ),
-    ("*CLOAD\n", "*CLOAD, LOAD CASE=2\n", "*CLOAD", r"the parameter LOADCASE is not read: AMPLITUDE, OP"),
+    ("*CLOAD\n", "*CLOAD, LOAD CASE=2\n", "*CLOAD", r"the parameter LOADCASE is not read: AMPLITUDE, NAME"),
     ("*CLOAD\n", "*CLOAD, TIME DELAY=1.\n", "*CLOAD", r"TIME DELAY needs an AMPLITUDE"),
     (
         "BAR_X0, 1, 3",
