@@ -118,9 +118,9 @@ class Acting:
                 mine, inner = self.model.in_body(body, self.model.node_sets[name])
                 if len(mine):
                     owned = self.model.owned(body, mine)
-                    each = moment.forces[mine, : self.model.dim] / self.model.thickness * owned[:, None]
+                    each = moment.forces[mine, : self.model.dim] * owned[:, None]
                     value: Any = (
-                        tuple((force / self.model.thickness).tolist())
+                        tuple(force.tolist())
                         if force is not None and owned.all()
                         else NodeValues(mesh.points[inner], each)
                     )
@@ -135,9 +135,9 @@ class Acting:
                 ]
         for weight in moment.weights:
             found += self._weights(weight)
-        for driven in self.model.driven:
+        for driven, name in self.holding.driven:
             if driven.spread:
-                found += self._spread(driven, moment)
+                found += self._spread(driven, name, moment)
         if moment.temperatures is not None:
             found += self._heat(moment.temperatures, bodies)
         return (*found, *self._stressed(bodies))
@@ -168,10 +168,15 @@ class Acting:
             found.append(InitialStress(part.name, value))
         return found
 
-    def _spread(self, driven: Driven, moment: Moment) -> list[Load]:
+    def _spread(self, driven: Driven, name: str, moment: Moment) -> list[Load]:
         """Return the force and moment of a node, spread over its surface."""
-        body, name = self.holding.body_of(driven)
-        held, load = driven.row(moment.held), driven.row(moment.forces) / self.model.thickness
+        body, *others = self.holding.bodies_of(name)
+        if others:
+            raise driven.card.error(
+                f"a distributing coupling loads a surface of one body, {driven.name!r} is on {body} and "
+                f"{', '.join(others)}: give one for each, with a node of its own"
+            )
+        held, load = driven.row(moment.held), driven.row(moment.forces)
         if not np.isnan(held).all():
             raise driven.card.error(
                 "a distributing coupling takes forces, but its node is held: use *KINEMATIC for displacements"
@@ -233,7 +238,8 @@ class Acting:
         numbers = np.array(weight.numbers)
         self._check_direction(weight, numbers)
         if weight.kind == "GRAV":
-            return gravity(part.name, density, (weight.value * numbers)[: self.model.dim].tolist(), region)
+            along = weight.value * numbers / np.linalg.norm(numbers)
+            return gravity(part.name, density, along[: self.model.dim].tolist(), region)
         speed = float(np.sqrt(weight.value))
         if self.model.dim == 3:
             return centrifugal(part.name, density, speed, tuple(numbers[:3]), tuple(numbers[3:]), region)

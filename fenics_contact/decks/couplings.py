@@ -65,6 +65,41 @@ def read_driven(cards: Sequence[Card], mesh: DeckMesh) -> list[Driven]:
     return found
 
 
+def by_node(driven: Sequence[Driven], mesh: DeckMesh) -> list[list[Driven]]:
+    """Return what is driven by the same node, which moves as one rigid piece, in the order of the deck."""
+    found: dict[int, list[Driven]] = {}
+    turned: dict[int, Driven] = {}
+    for each in driven:
+        others = found.setdefault(each.node, [])
+        if others and (each.spread or others[0].spread):
+            raise each.card.error(
+                f"node {mesh.numbers[each.node]} is the reference node of {others[0].name!r}, too, and a "
+                "distributing coupling shares its force: give each surface a node of its own, or one surface "
+                "of all faces"
+            )
+        first = turned.setdefault(each.turning, each) if each.turning >= 0 else each
+        for other in (*others[:1], first):
+            if (other.node, other.turning) != (each.node, each.turning):
+                raise each.card.error(
+                    f"{each.name!r} shares one of its nodes with {other.name!r}, but not both: surfaces that "
+                    "move as one piece need the same REF NODE and the same ROT NODE, others their own"
+                )
+        others.append(each)
+    return list(found.values())
+
+
+def require_own_nodes(users: Sequence[tuple[Card, int]], mesh: DeckMesh) -> None:
+    """Reject a node that draws several sections, or is the mean of several sets: what it has is for one."""
+    seen = set[int]()
+    for card, node in users:
+        if node in seen:
+            raise card.error(
+                f"node {mesh.numbers[node]} is that of a card before, too, and its force would act twice: "
+                "give each a node of its own"
+            )
+        seen.add(node)
+
+
 def _range(card: Card, row: int) -> range:
     numbers = [int(n) for n in card.floats(row)]
     return range(numbers[0], (numbers[1] if len(numbers) > 1 and numbers[1] else numbers[0]) + 1)

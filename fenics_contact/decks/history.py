@@ -258,6 +258,9 @@ class _Course:
                 needed = 4 if label == "GRAV" else 7
                 if len(numbers) != needed:
                     raise card.error(f"{label} needs {needed} numbers behind it, got {len(numbers)}", row)
+                if not any(numbers[-3:]):
+                    what = "a direction" if label == "GRAV" else "the direction of an axis"
+                    raise card.error(f"{label} needs {what}, its last three numbers, got zeros", row)
                 self.mesh.elements_named(where, card, row)
                 before = self.weights.get((where, label), (None, 0, 0.0))[0]
                 load = Weight(where, card, row, label, numbers[0], numbers[1:])

@@ -17,14 +17,16 @@ from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Rolle
 from fenics_contact.decks.couplings import (
     Bolt,
     Driven,
+    by_node,
     rigid_surface,
 )
 from fenics_contact.decks.history import Held, Moment
 from fenics_contact.decks.model import Model
+from fenics_contact.decks.rigid_links import by_small_turns, following, in_their_space, spread_out
 from fenics_contact.readers.deck_bodies import (
     Component,
 )
-from fenics_contact.readers.deck_mesh import Faces
+from fenics_contact.readers.deck_mesh import Faces, joined
 
 
 class Holding:
@@ -32,7 +34,8 @@ class Holding:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self.driven_at: dict[int, str] = {}
+        #: What nodes drive or load, with the name of the surface, or of the set of nodes.
+        self.driven: list[tuple[Driven, str]] = []
 
     def supported(self) -> dict[str, tuple[np.ndarray, tuple[int, ...]]]:
         """Return what is held in any step by name: nodes and components. Single nodes are put together."""
@@ -113,9 +116,9 @@ class Holding:
                 if not len(mine):
                     continue
                 found += self._supports_of(body, name, mine, mesh.points[inner], held, moment)
-        for driven in self.model.driven:
+        for driven, name in self.driven:
             if not driven.spread:
-                found.append(self._rigid(driven, moment))
+                found += self._rigid(driven, name, moment)
         return tuple(found)
 
     def _supports_of(
@@ -173,31 +176,52 @@ class Holding:
 
     def name_surfaces(self) -> None:
         """Name the surfaces that nodes drive or load."""
-        for driven in self.model.driven:
-            if {driven.node, driven.turning} & set(self.model.local_axes):
-                raise driven.card.error(
-                    "the node of a rigid surface must move along x, y and z, it has axes of its own by "
-                    "*TRANSFORM: leave it out of that set"
-                )
-            name = driven.surface
-            if not name and driven.nodes is not None and not driven.spread:
-                inside = driven.nodes[self.model.nodes_of_bodies()[driven.nodes]]
-                if len(inside) and self.model.exterior.covering(inside) is None:
-                    self.driven_at[id(driven)] = self.model.place(f"{driven.name} RIGID", inside)
-                    continue
-            if name:
-                faces = self.model.exterior.faces_of(self.model.mesh.surface_named(name, driven.card))
-            elif driven.nodes is not None:
-                name, faces = f"{driven.name} RIGID", self.model.exterior.covering(driven.nodes)
+        for several in by_node(self.model.driven, self.model.mesh):
+            for each in several:
+                self._check_axes(each)
+            parts = [self._part(each) for each in several]
+            name = " AND ".join(dict.fromkeys(name for name, _ in parts))
+            faces = [part for _, part in parts if isinstance(part, Faces)]
+            if len(faces) == len(parts):
+                self.model.surfaces[name] = faces[0] if len(faces) == 1 else joined(faces)
             else:
-                name, faces = f"{driven.name} RIGID", self._whole(driven)
-            if faces is None or not self.model.exterior.holds(faces).all():
-                raise driven.card.error(
-                    f"{driven.name!r} must be faces on the boundary of a body, or all nodes of some "
-                    "faces, so that they move as one piece: give such a set"
+                single = [part for _, part in parts if isinstance(part, np.ndarray)]
+                of_faces = [n.ravel() for each in faces for _, _, _, n in self.model.mesh.parts_of(each)]
+                name = self.model.place(name, np.unique(np.concatenate([*single, *of_faces])))
+            self.driven.append((several[0], name))
+            if len(several) > 1 and several[0].turning < 0:
+                self.model.note(
+                    several[0].card,
+                    f"{' and '.join(each.name for each in several)} have one reference node: they move and "
+                    "turn as one piece, where CalculiX lets each turn by itself about the node",
                 )
-            self.model.surfaces[name] = faces
-            self.driven_at[id(driven)] = name
+
+    def _check_axes(self, driven: Driven) -> None:
+        if {driven.node, driven.turning} & set(self.model.local_axes):
+            raise driven.card.error(
+                "the node of a rigid surface must move along x, y and z, it has axes of its own by "
+                "*TRANSFORM: leave it out of that set"
+            )
+
+    def _part(self, driven: Driven) -> tuple[str, Faces | np.ndarray]:
+        """Return the name of what a card drives, and its faces, or nodes that are not all nodes of faces."""
+        exterior = self.model.exterior
+        name = driven.surface or f"{driven.name} RIGID"
+        if not driven.surface and driven.nodes is not None:
+            inside = driven.nodes[self.model.nodes_of_bodies()[driven.nodes]]
+            if len(inside) and not driven.spread and exterior.covering(inside) is None:
+                return name, inside
+            faces = exterior.covering(driven.nodes)
+        elif driven.surface:
+            faces = exterior.faces_of(self.model.mesh.surface_named(name, driven.card))
+        else:
+            faces = self._whole(driven)
+        if faces is None or not exterior.holds(faces).all():
+            raise driven.card.error(
+                f"{driven.name!r} must be faces on the boundary of a body, or all nodes of some "
+                "faces, so that they move as one piece: give such a set"
+            )
+        return name, faces
 
     def _whole(self, driven: Driven) -> Faces | None:
         """Return the boundary of the bodies whose elements are those of a set."""
@@ -208,30 +232,70 @@ class Holding:
                 return Faces(self.model.exterior.faces.elements[mine], self.model.exterior.faces.sides[mine])
         return None
 
-    def body_of(self, driven: Driven) -> tuple[str, str]:
-        """Return the one body of a driven surface, and the name of the surface."""
-        name = self.driven_at[id(driven)]
+    def bodies_of(self, name: str) -> list[str]:
+        """Return the bodies that have a driven surface, or set of nodes."""
         meshes = self.model.parts.meshes.items()
-        bodies = [body for body, mesh in meshes if name in mesh.surfaces or name in mesh.node_sets]
-        if len(bodies) != 1:
-            raise driven.card.error(
-                f"a node drives a surface of one body, {driven.name!r} is on {', '.join(bodies)}: give "
-                "one for each"
-            )
-        return bodies[0], name
+        return [body for body, mesh in meshes if name in mesh.surfaces or name in mesh.node_sets]
 
-    def _rigid(self, driven: Driven, moment: Moment | None) -> RigidSurface:
-        body, name = self.body_of(driven)
+    def _rigid(self, driven: Driven, name: str, moment: Moment | None) -> list[RigidSurface]:
+        """Return the rigid surfaces of a node: that of the first body, or of all where all is given."""
         self.model.origins["support", name] = driven.card.origin
-        if moment is None:
-            first = self.model.history.steps[0].moments[0] if self.model.history.steps else None
-            start = (
-                None if first is None else replace(first, held=0.0 * first.held, forces=0.0 * first.forces)
+        if moment is None and self.model.history.steps:
+            first = self.model.history.steps[0].moments[0]
+            moment = replace(first, held=0.0 * first.held, forces=0.0 * first.forces)
+        at = self.model.mesh.points[driven.node, : self.model.dim]
+        bodies = self._rigid_bodies(driven, name)
+        return [rigid_surface(driven, body, name, at, moment) for body in bodies]
+
+    def _rigid_bodies(self, driven: Driven, name: str) -> list[str]:
+        """Return the bodies with a rigid surface of their own; others follow that of the first one."""
+        bodies = self.bodies_of(name)
+        held = [driven.row(moment.held)[self.model.motions] for moment in self.model.history.moments]
+        if len(bodies) == 1 or (held and not np.isnan(held).any()):
+            return bodies
+        sizes = [len(spread_out(self.model.parts.meshes[b].points[self._nodes(b, name)])) for b in bodies]
+        return [bodies[int(np.argmax(sizes))]]
+
+    def _nodes(self, body: str, name: str) -> np.ndarray:
+        """Return nodes of a surface or set that the deck has."""
+        own = self.model.parts.meshes[body].nodes_to_hold(name)
+        return np.asarray(own[self.model.parts.nodes[body][own] >= 0])
+
+    def _links(self) -> list[LinearConstraint]:
+        """Return how surfaces of further bodies follow the rigid surface of the first one."""
+        meshes, found = self.model.parts.meshes, []
+        for driven, name in self.driven:
+            if driven.spread:
+                continue
+            first, *own = self._rigid_bodies(driven, name)
+            for body in self.bodies_of(name):
+                if body == first or body in own:
+                    continue
+                leaders = self._nodes(first, name)
+                leaders = leaders[spread_out(meshes[first].points[leaders])]
+                nodes = self._nodes(body, name)
+                moved = self._moved(driven, name, meshes[body].points[nodes], meshes[first].points[leaders])
+                used = leaders[: moved.shape[2]]
+                found.append(following(f"{body} {name}", body, nodes, first, used, moved))
+        return found
+
+    def _moved(self, driven: Driven, name: str, points: np.ndarray, leaders: np.ndarray) -> np.ndarray:
+        """Return how points move with others of one rigid piece, (n, components, m, dim)."""
+        dim, moments = self.model.dim, self.model.history.moments
+        turned = [k for k in self.model.motions if k > 2]
+        turns = any((driven.row(moment.held)[turned] != 0.0).any() for moment in moments)
+        weights = in_their_space(points, leaders) if turns else np.ones((len(points), 1))
+        if weights is None and not any(step.large for step in self.model.history.steps):
+            moved = by_small_turns(points, leaders)
+            if moved is not None:
+                return moved
+        if weights is None:
+            raise driven.card.error(
+                f"{name!r} is on several bodies, and its nodes on one of them do not say how it turns: hold "
+                "the rotations of its node at zero, take NLGEOM away, or join the bodies"
             )
-            moment = start
-        return rigid_surface(
-            driven, body, name, self.model.mesh.points[driven.node, : self.model.dim], moment
-        )
+        components = np.eye(dim)[1:] if self.model.kind == "axisymmetric" else np.eye(dim)
+        return np.einsum("nm,kd->nkmd", weights, components)
 
     def name_nodes(self) -> None:
         """Name the nodes that an equation holds alone, and reject equations of what has no displacement."""
@@ -271,7 +335,7 @@ class Holding:
             rollers.append(Roller(body, name, 0.0, tuple(normal.tolist())))
         terms = self._terms()
         constraints = [LinearConstraint(terms, name="EQUATIONS")] if terms else []
-        return rollers, [*constraints, *self._joints()]
+        return rollers, [*constraints, *self._joints(), *self._links()]
 
     def _joints(self) -> list[LinearConstraint]:
         """Return what joins bodies that share nodes, but no faces."""

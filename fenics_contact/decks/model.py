@@ -15,6 +15,7 @@ from fenics_contact.decks.couplings import (
     read_bolts,
     read_driven,
     read_equations,
+    require_own_nodes,
 )
 from fenics_contact.decks.history import History, read_history
 from fenics_contact.decks.initial_stress import read_initial
@@ -64,6 +65,8 @@ class Model:
         self.driven = read_driven(cards, self.mesh)
         self.bolts = read_bolts(cards, self.mesh)
         self.means = read_means(cards, self.mesh)
+        require_own_nodes([(each.card, each.node) for each in self.bolts], self.mesh)
+        require_own_nodes([(each.card, each.node) for each in self.means], self.mesh)
         large = any(step.large for step in self.history.steps)
         held = [~np.isnan(moment.held) for moment in self.history.moments]
         self.equations = [
@@ -77,7 +80,7 @@ class Model:
         self.references = np.array(
             [node for several in nodes for node in several if node >= 0], dtype=np.int64
         )
-        self._turn_forces()
+        self._share_forces()
 
     def _split(self) -> None:
         """Cut sections where a part of them is loaded."""
@@ -93,26 +96,29 @@ class Model:
         if text not in self.notes:
             self.notes.append(text)
 
-    def _turn_forces(self) -> None:
-        """Give forces on nodes with local axes along x, y and z, and those of means to their nodes."""
-        if self.local_axes or self.means:
-            steps = [
-                replace(
-                    step,
-                    moments=[
-                        replace(m, forces=shared_out(in_global_axes(m.forces, self.local_axes), self.means))
-                        for m in step.moments
-                    ],
-                )
-                for step in self.history.steps
-            ]
-            self.history = replace(self.history, steps=steps)
+    def _share_forces(self) -> None:
+        """Take forces per unit of thickness and along x, y and z, those of means on their nodes."""
+        steps = [
+            replace(step, moments=[replace(m, forces=self._shared(m.forces)) for m in step.moments])
+            for step in self.history.steps
+        ]
+        self.history = replace(self.history, steps=steps)
+
+    def _shared(self, forces: np.ndarray) -> np.ndarray:
+        return shared_out(in_global_axes(forces, self.local_axes), self.means) / self.thickness
 
     def _thickness(self) -> float:
         if self.kind not in ("plane stress", "plane strain"):
             return 1.0
         found = {section.thickness for section in self.sections}
         return 1.0 if len(found) > 1 else found.pop()
+
+    @property
+    def motions(self) -> list[int]:
+        """Components of displacement and rotation that a rigid piece has, from zero."""
+        if self.kind == "axisymmetric":
+            return [1]
+        return list(range(6)) if self.dim == 3 else [0, 1, 5]
 
     @property
     def _has_thicknesses(self) -> bool:

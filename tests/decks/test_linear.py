@@ -349,3 +349,15 @@ def test_forces_of_many_sizes_on_a_plate_are_per_thickness_and_add_up(tmp_path: 
     assert sorted(forces[:, 0]) == pytest.approx(sorted([10.0, *range(2, 9)] / np.array(4.0)))
     (table,) = found.tables(found.solve(MPI.COMM_SELF, tolerance=1e-10)[0])
     assert table.rows[0, 1] == pytest.approx(-45.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("vector", ["0., 0., -1.", "0., 0., -2.5"])
+def test_the_vector_of_gravity_is_a_direction(vector: str, tmp_path: Path) -> None:
+    """A column of height 1 under ρ g = 2100 gets shorter by ρ g h² / 2 E, whatever the vector's length."""
+    text = mesh_cards({"BAR": block((0, 0, 0), (1, 1, 1), (1, 1, 1))}) + STEEL.replace("0.3", "0.0")
+    text += "*DENSITY\n7.\n" + SECTION + "*BOUNDARY\nBAR_Z0, 1, 3\n"
+    found = read_deck(deck(tmp_path, text + step(f"*DLOAD\nBAR, GRAV, 300., {vector}\n")))
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    assert state.gather_displacement("BAR")[:, 2].min() == pytest.approx(-2100.0 / 2 / 210000.0, rel=1e-8)
+    with pytest.raises(DeckError, match=r"GRAV needs a direction, its last three numbers, got zeros"):
+        read_deck(deck(tmp_path, text + step("*DLOAD\nBAR, GRAV, 300., 0., 0., 0.\n")))
