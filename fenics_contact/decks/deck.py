@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +35,7 @@ from fenics_contact.decks.holding import Holding
 from fenics_contact.decks.model import Model
 from fenics_contact.decks.pair_changes import read_changes
 from fenics_contact.decks.tables import Print, PrintTable, tables_of
+from fenics_contact.decks.ties import reach_of
 from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PARAMETERS, PROCEDURES, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
@@ -326,7 +327,24 @@ class _Builder:
         for each in sides:
             self._contact_surface(each.slave, each, alone=not each.tied)
             self._contact_surface(each.master, each)
-        return sides
+        return [reached for each in sides for reached in self._reached(each)]
+
+    def _reached(self, of: Sides) -> list[Sides]:
+        """Return a pair, or a tie of the faces within its tolerance, if there are any."""
+        if of.card.name != "TIE" or of.around is not None:
+            return [of]
+        model = self.model
+        slave, master = (model.surfaces[self.sides_by_name[name]] for name in (of.slave, of.master))
+        reach = reach_of(of.card, model.mesh, slave, master)
+        for words in reach.in_words(of.slave, of.master, model.mesh):
+            model.note(of.card, words)
+        if not reach.tied.any():
+            return []
+        if reach.tied.all():
+            return [of]
+        name = f"{of.slave} TIED TO {of.master}"
+        model.surfaces[name], self.sides_by_name[name] = reach.kept, name
+        return [replace(of, slave=name)]
 
     def _contact_surface(self, name: str, of: Sides, alone: bool = False) -> None:
         """Take the faces of a surface, of one of nodes, or of a node set, those that have all of them.

@@ -69,6 +69,18 @@ class Element:
             for face in self.faces
         ]
 
+    @cached_property
+    def rims(self) -> Sequence[Sequence[int]]:
+        """Positions of the nodes of its faces in their order around the face, of plane elements along it."""
+        corners = 1 + max(map(max, self.faces))
+        between = {frozenset(edge): corners + k for k, edge in enumerate(_EDGES[self.shape])}
+        found = []
+        for face in self.faces:
+            ends = list(zip(face, [*face[1:], face[0]], strict=True))[: len(face) - (self.dim == 2)]
+            rim = [n for end in ends for n in (end[0], between[frozenset(end)]) if n < self.count]
+            found.append(rim if self.dim == 3 else [*rim, face[-1]])
+        return found
+
 
 _KINDS = {"C3D": "solid", "CPS": "plane stress", "CPE": "plane strain", "CAX": "axisymmetric"}
 _CELLS = {
@@ -146,6 +158,11 @@ class Collapsed(Element):
     @property
     def face_nodes(self) -> Sequence[Sequence[int]]:  # type: ignore[override]
         """Positions of all nodes of its faces."""
+        return self.faces
+
+    @property
+    def rims(self) -> Sequence[Sequence[int]]:  # type: ignore[override]
+        """Positions of the nodes of its faces in their order around the face."""
         return self.faces
 
 
