@@ -190,9 +190,12 @@ class TurnedSurface:
     def basis(self) -> tuple[np.ndarray, np.ndarray]:
         """Orthonormal rates, shape (n · dim, n_free), and the matrix S of q̇ ↦ S q̇ in terms of them."""
         rates = self.rates.reshape(self.points.size, -1)
-        found, size = np.linalg.qr(rates), np.linalg.norm(rates, axis=0)
+        found, arm = np.linalg.qr(rates), float(np.abs(self.arms).max()) or 1.0
+        units = np.repeat([1.0, arm], [self.surface.dim, self.surface.turns])[self.free]
+        size = np.linalg.norm(rates, axis=0) / units
         # At a full turn rates depend on each other.
-        if np.abs(np.diag(found[1])).min(initial=np.inf) <= np.sqrt(LAST_PLACES) * size.max(initial=0.0):
+        own = np.abs(np.diag(found[1])) / units
+        if own.min(initial=np.inf) <= np.sqrt(LAST_PLACES) * size.max(initial=0.0):
             raise ConvergenceError(
                 "rotations that are free about several axes must stay below a full turn, but the motion of "
                 f"surface {self.surface.surface!r} of body {self.surface.body!r} is {self.motion.tolist()}: "

@@ -38,6 +38,7 @@ def contradicting(rows: Array, limits: Array, equal: NDArray[np.bool_]) -> list[
         filters, chapter 6).
     """
     unit, limit = unit_rows(rows, limits)
+    limit = limit / (np.abs(limit).max(initial=0.0) or 1.0)
     left = _elastic(unit, limit, equal)
     for k in list(left):
         others = [one for one in left if one != k]
@@ -61,7 +62,7 @@ def _elastic(rows: Array, limits: Array, equal: NDArray[np.bool_], *, rounding: 
         b_ub=np.concatenate([limits, -limits[equal]]),
         bounds=[(None, None)] * n + [(0.0, None)] * m,
     )
-    if not found.success or found.fun <= rounding * (1.0 + np.abs(limits).max()):
+    if not found.success or found.fun <= rounding:
         return []
     pushes = np.abs(slacks.T) @ np.abs(found.ineqlin.marginals)
     return [int(k) for k in np.flatnonzero(pushes > rounding)]
@@ -164,7 +165,9 @@ class FeasibleSet:
             One phrase for each violation; empty where x is feasible.
         """
         messages = []
-        margin = _FEASIBILITY * (1.0 + np.abs(x))
+        given = [np.where(np.isfinite(each), np.abs(each), 0.0) for each in (x, self.lower, self.upper)]
+        size = np.max(given, axis=0, initial=0.0)
+        margin = _FEASIBILITY * size + 10.0 * np.finfo(float).eps * size.max(initial=0.0)
         for k in np.flatnonzero(x < self.lower - margin):
             messages.append(f"x[{k}] = {x[k]:.6g} is below its lower bound {self.lower[k]:.6g}")
         for k in np.flatnonzero(x > self.upper + margin):

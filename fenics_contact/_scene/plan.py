@@ -142,7 +142,7 @@ def held_components(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarr
     rows = [(modes if axes is None else axes.to_local(modes))[~np.isnan(prescribed)]]
     for surface in loose:
         if surface.body == body:
-            rows.append(_of_point(surface, mesh, modes)[~surface.free])
+            rows.append(_of_point(surface, mesh, modes)[0][~surface.free])
     return np.concatenate(rows)
 
 
@@ -151,17 +151,23 @@ def point_loads(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarray:
     total = np.zeros(modes.shape[2])
     for surface in scene.supports:
         if isinstance(surface, RigidSurface) and surface.body == body and surface.load.any():
-            total += surface.load @ _of_point(surface, scene.bodies[body].mesh, modes)
+            moved, factors = _of_point(surface, scene.bodies[body].mesh, modes)
+            total += (factors * surface.load) @ moved
     return total
 
 
-def _of_point(surface: RigidSurface, mesh: BodyMesh, modes: np.ndarray) -> np.ndarray:
-    """Return displacement and rotation of the point for motions of its body, (n_components, n_modes)."""
+def _of_point(
+    surface: RigidSurface, mesh: BodyMesh, modes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return displacement and rotation of the point for motions of its body, and the units of both.
+
+    Rotations count times the largest arm, see `RigidSurface.unit_modes`: shapes (n_components, n_modes) and
+    (n_components,).
+    """
     nodes = mesh.nodes_of(surface.surface)
-    moved = surface.modes(mesh.points[nodes]).reshape(-1, len(surface.motion))
-    size = np.linalg.norm(moved, axis=0)
-    fitted = np.linalg.lstsq(moved / size, modes[nodes].reshape(len(moved), -1), rcond=None)[0]
-    return np.asarray(fitted / size[:, None])
+    moved, factors = surface.unit_modes(mesh.points[nodes])
+    moved = moved.reshape(-1, len(factors))
+    return np.linalg.lstsq(moved, modes[nodes].reshape(len(moved), -1), rcond=MOTION_ROUNDING)[0], factors
 
 
 def resisted_motions(held: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
+from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.kernels import motions_about
@@ -332,6 +333,23 @@ class RigidSurface:
             Shape (n, dim, 3) in the plane, (n, dim, 6) in space.
         """
         return motions_about(points, np.array(self.at))
+
+    def unit_modes(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return `modes` in which translations and turns move points about as far, in any unit of length.
+
+        Args:
+            points: Coordinates, shape (n, dim), [length].
+
+        Returns:
+            The modes, dimensionless, and by what those of U and θ are multiplied: by one, and by one over the
+            largest arm, [1 / length], shape (3,) in the plane, (6,) in space.
+        """
+        modes = self.modes(points)
+        arm = np.abs(modes[:, :, self.dim :]).max(initial=0.0)
+        if arm <= ROUNDING * max(np.abs(points).max(initial=0.0), np.abs(self.at).max()):
+            modes[:, :, self.dim :], arm = 0.0, 1.0  # a single node at the point
+        factors = np.repeat([1.0, 1.0 / arm], [self.dim, self.turns])
+        return modes * factors, factors
 
     @property
     def prescribed(self) -> np.ndarray:

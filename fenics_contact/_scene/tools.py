@@ -54,16 +54,20 @@ class ToolBody(Body):
         return motions_about(points, np.array(self.tool.at))
 
     def kernel(self, points: np.ndarray) -> np.ndarray:
-        """Return the motions that no spring resists, (n, dim) -> (n, dim, n_modes)."""
+        """Return the motions that no spring resists, (n, dim) -> (n, dim, n_modes), turns by size of cell."""
         free = np.array(self.springs) == 0.0 if self.springs else np.ones(3 * self.tool.dim - 3, dtype=bool)
         if self.axisymmetric:  # other motions strain a body of revolution
             free &= [False, True, False]
-        return self.modes(points)[:, :, free]
+        modes, dim = self.modes(points), self.tool.dim
+        modes[:, :, dim:] /= np.abs(self.mesh.points - np.array(self.tool.at)).max()
+        return modes[:, :, free]
 
     def spring_matrix(self, points: np.ndarray) -> np.ndarray:
         """Return the stiffness of the springs on nodes that move with the tool, (n · dim, n · dim)."""
-        motion = np.linalg.pinv(self.modes(points).reshape(points.size, -1))
-        return np.asarray(motion.T @ np.diag(self.springs) @ motion)
+        arm, dim = np.abs(self.mesh.points - np.array(self.tool.at)).max(), self.tool.dim
+        units = np.repeat([1.0, arm], [dim, 2 * dim - 3])
+        motion = np.linalg.pinv(self.modes(points).reshape(points.size, -1) / units)
+        return np.asarray(motion.T @ np.diag(self.springs / units**2) @ motion)
 
     def frame(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rotation R and translation c of the tool, R x + c, from places of its nodes, (n, dim)."""

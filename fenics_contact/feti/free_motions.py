@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.display import counted, displayed
-from fenics_contact._base.sparse import LAST_PLACES
+from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
@@ -149,14 +149,15 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
             continue
         mesh = scene.bodies[surface.body].mesh
         own = mesh.nodes_to_hold(surface.surface)
-        modes = surface.modes(mesh.points[own])[:, :, surface.free]
+        modes, factors = surface.unit_modes(mesh.points[own])
+        modes, load = modes[:, :, surface.free], (factors * surface.load)[surface.free]
         others = [support for place, support in enumerate(scene.supports) if place != number]
         prescribed, axes = scene.prescribed_along(surface.body, others)
         along = np.zeros((*prescribed.shape, modes.shape[2]))
         along[own] = modes
         along = (along if axes is None else axes.to_local(along))[own]
-        _require_room(surface, along, ~np.isnan(prescribed[own]), mesh.points[own])
-        basis, load = _independent(surface, modes.reshape(-1, modes.shape[2]))
+        _require_room(surface, along, ~np.isnan(prescribed[own]))
+        basis, load = _independent(surface, modes.reshape(-1, modes.shape[2]), load)
         node, component = np.indices(modes.shape[:2]).reshape(2, -1)
         row = tearing.global_nodes(surface.body, own)[node] * scene.components + component
         place = np.broadcast_to(np.arange(basis.shape[1]), basis.shape)
@@ -171,18 +172,19 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
 
 
 def _independent(
-    surface: RigidSurface, modes: np.ndarray, near: float = 1e-9
+    surface: RigidSurface, modes: np.ndarray, load: np.ndarray, near: float = 1e-9
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return orthonormal motions of nodes, (n, k), and the load on each, (k,).
 
     Nodes in a line are not moved by turning about it: that motion is left out.
 
-    `modes`: motions of nodes by free components, (n, m); `near`: singular value, relative to the largest, of
-    what moves no node, and share of the load on it that is rounding.
+    `modes`: motions of nodes by free components, dimensionless, (n, m); `load`: that on each, (m,), [force];
+    `near`: singular value, relative to the largest, of what moves no node, and share of the load on it that
+    is rounding.
     """
-    load = surface.load[surface.free]
     basis, scale = np.linalg.qr(modes)
     left, size, turned = np.linalg.svd(scale)
+    size = np.pad(size, (0, len(turned) - len(size)))  # of a single node
     moves = size > near * size.max()
     if moves.all():
         return basis, np.linalg.solve(scale.T, load)
@@ -190,9 +192,10 @@ def _independent(
     if np.abs(along[~moves]).max() > near * np.abs(load).max():
         raise InfeasibleError(
             f"the moment on rigid surface {surface.surface!r} of body {surface.body!r} turns about the line "
-            "of its nodes, which moves none of them: name nodes that are not in a line, or leave it out"
+            "of its nodes, which moves none of them: name three nodes that are not in a line, or leave it "
+            "out"
         )
-    return basis @ left[:, moves], along[moves] / size[moves]
+    return basis @ left[:, moves[: len(left)]], along[moves] / size[moves]
 
 
 def _require_flexible_slaves(scene: Scene, tearing: Tearing, moving: np.ndarray) -> None:
@@ -209,11 +212,10 @@ def _require_flexible_slaves(scene: Scene, tearing: Tearing, moving: np.ndarray)
             )
 
 
-def _require_room(surface: AnySupport, modes: np.ndarray, held: np.ndarray, points: np.ndarray) -> None:
+def _require_room(surface: AnySupport, modes: np.ndarray, held: np.ndarray) -> None:
     """Reject free motions of nodes, (n, dim, k), along components that other supports hold, (n, dim)."""
     against = np.abs(modes[held]).max(axis=0, initial=0.0)
-    size = 1.0 + np.abs(points - points.mean(axis=0)).max()
-    if np.any(against > LAST_PLACES * size):
+    if np.any(against > ROUNDING):
         raise InvalidInputError(
             f"the rigid surface {surface.surface!r} of body {surface.body!r} meets another support at "
             f"{counted(int(held.any(axis=1).sum()), 'node')}, which holds what the surface is free to move: "

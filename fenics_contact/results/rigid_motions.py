@@ -129,10 +129,10 @@ def rigid_motion(
     motion = known
     if motion is None:
         mesh = body.mesh
-        nodes = np.unique(mesh.surfaces[support.surface])
-        modes = support.modes(mesh.points[nodes]).reshape(-1, len(support.motion))
-        size = np.linalg.norm(modes, axis=0)
-        motion = np.linalg.lstsq(modes / size, displacement[nodes].ravel(), rcond=None)[0] / size
+        nodes = mesh.nodes_of(support.surface)
+        modes, factors = support.unit_modes(mesh.points[nodes])
+        modes = modes.reshape(-1, len(factors))
+        motion = factors * np.linalg.lstsq(modes, displacement[nodes].ravel(), rcond=MOTION_ROUNDING)[0]
         motion = np.where(support.free, motion, support.prescribed)
     moved, turned = np.split(motion, [scene.dim])
     return RigidMotion(where, np.array(support.at), moved, float(turned[0]) if scene.dim == 2 else turned)

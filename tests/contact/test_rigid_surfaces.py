@@ -18,6 +18,7 @@ from fenics_contact import (
     ContactProblem,
     Coulomb,
     LoadStep,
+    PointForce,
     RigidPlane,
     RigidSurface,
     Scene,
@@ -34,7 +35,7 @@ from fenics_contact._equilibrium.static_admissibility import check_held
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.results import RigidMotion
 from fenics_contact.results.deformed_state import AnyState
@@ -366,3 +367,59 @@ def test_contacts_and_ties_of_rigid_surfaces_are_refused() -> None:
         [motion.displacement] * 9,
         atol=1e-9,
     )
+
+
+def lever(length: float, law: type[IsotropicElasticity] | type[NeoHooke]) -> Scene:
+    """A block on a floor, pushed beside its middle by a rigid top that may sink and turn."""
+    mesh = block((0.0, 0.0, 0.0), (2.0 * length, length, length), (4, 2, 2))
+    floor = ContactPair(Surface("block", "z0"), RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+    at = (0.8 * length, 0.5 * length, length)
+    top = RigidSurface("block", "z1", at, (0.0, 0.0, None), (0.0, None, 0.0), (0.0, 0.0, -1e-3))
+    return Scene({"block": Body(mesh, law(1.0 / length**2, 0.3))}, [top], contacts=[floor])
+
+
+@pytest.mark.parametrize("law", [IsotropicElasticity, NeoHooke])
+@pytest.mark.parametrize("length", [1e-12, 1e-9, 1.0, 1e10])
+def test_a_free_turn_balances_moments_in_any_unit_of_length(length: float, law: Any) -> None:
+    state = solve_scene(lever(length, law), COMM, tolerance=1e-9)
+    points, force = state.scene.points[state.contact.points.slave] / length, state.contact.normal_force
+    assert force.sum() == pytest.approx(1e-3, rel=1e-6)
+    assert points[:, 0] @ force == pytest.approx(0.8e-3, rel=3e-4)
+    assert points[:, 1] @ force == pytest.approx(0.5e-3, rel=3e-4)
+    assert state.rigid_motions()[0].rotation[1] == pytest.approx(-2.75e-4, rel=2e-3)  # type: ignore[index]
+
+
+@pytest.mark.parametrize("length", [1e-9, 1.0, 1e10])
+def test_turns_that_a_rigid_surface_prescribes_hold_bodies_of_any_size(length: float) -> None:
+    scene = lever(length, IsotropicElasticity)
+    held = replace(scene.supports[0], rotation=(0.0, 0.0, 0.0))  # type: ignore[type-var]
+    state = solve_scene(replace(scene, supports=[held]), COMM, tolerance=1e-9)
+    assert state.unheld == ()
+    assert state.reactions()["block z1"].moment[1] == pytest.approx(0.2e-3 * length, rel=1e-5)
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e10])
+def test_other_supports_leave_room_for_a_free_motion_in_any_unit_of_length(length: float) -> None:
+    scene = lever(length, IsotropicElasticity)
+    turning = replace(scene.supports[0], rotation=None)  # type: ignore[type-var]
+    symmetric = Support("block", "y0", (None, 0.0, None))
+    with pytest.raises(InvalidInputError, match="holds what the surface is free to move"):
+        solve_scene(replace(scene, supports=[turning, symmetric]), COMM)
+    assert solve_scene(replace(scene, supports=[scene.supports[0], symmetric]), COMM).unheld == ()
+
+
+def test_a_single_node_is_a_rigid_surface_without_turns() -> None:
+    mesh = replace(block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (4, 2, 2)), node_sets={"tip": [0]})
+    corner = RigidSurface("bar", "tip", (0.0, 0.0, 0.0), force=(0.1, 0.0, -1.0))
+    hold = Support("bar", "x1")
+    state = solve_scene(Scene({"bar": Body(mesh, SOFT)}, [hold, corner]), COMM, tolerance=1e-10)
+    loaded = PointForce("bar", "tip", (0.1, 0.0, -1.0))
+    plain = solve_scene(Scene({"bar": Body(mesh, SOFT)}, [hold], [loaded]), COMM, tolerance=1e-10)
+    moved = plain.gather_displacement("bar")
+    np.testing.assert_allclose(state.gather_displacement("bar"), moved, atol=1e-8 * np.abs(moved).max())
+    motion = state.rigid_motions()[0]
+    np.testing.assert_allclose(motion.displacement, moved[0], rtol=1e-8)
+    assert not np.any(motion.rotation)
+    twisted = replace(corner, moment=(0.0, 1.0, 0.0))
+    with pytest.raises(InfeasibleError, match="name three nodes that are not in a line"):
+        solve_scene(Scene({"bar": Body(mesh, SOFT)}, [hold, twisted]), COMM)

@@ -95,11 +95,12 @@ def test_the_fewest_constraints_that_contradict_each_other_are_named() -> None:
         nearest_feasible(np.zeros(2), None, both)
 
 
-def test_of_three_that_contradict_each_other_none_can_be_left_out() -> None:
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_of_three_that_contradict_each_other_none_can_be_left_out(unit: float) -> None:
     angles = 2 * np.pi * np.arange(3) / 3
     rows = np.column_stack([np.cos(angles), np.sin(angles)])
     extra = np.vstack([rows, [[1.0, 0.2], [0.3, -1.0]]])
-    limits, equal = np.array([-1.0, -1.0, -1.0, 5.0, 5.0]), np.zeros(5, dtype=bool)
+    limits, equal = unit * np.array([-1.0, -1.0, -1.0, 5.0, 5.0]), np.zeros(5, dtype=bool)
     assert contradicting(extra, limits, equal) == [0, 1, 2]
     for k in range(3):
         kept = np.delete(np.arange(5), k)
@@ -113,6 +114,13 @@ def test_violations_are_named_with_their_amount() -> None:
     assert "x[2] = 4 is above its upper bound 2" in found[1]
     assert "row 0 of A x ≤ b is exceeded by 4" in found[2]
     assert "row 0 of E x = e is missed by -1.25" in found[3]
+
+
+def test_bounds_are_violated_in_any_unit_of_length() -> None:
+    for unit in (1e-9, 1.0, 1e9):
+        allowed = feasible_set(2, (0.0, unit))
+        assert len(allowed.violations(unit * np.array([-0.1, 1.1]))) == 2
+        assert allowed.violations(unit * np.array([-1e-16, 1.0 + 1e-16])) == []
 
 
 def test_rounding_is_no_violation() -> None:
