@@ -78,6 +78,8 @@ def ring(kind: str, sides: tuple[str, str] = ("roof", "floor")) -> Scene:
     up, out = (points[facets].mean(axis=1)[:, -1] > 0 for facets in (inner, outer))
     surfaces = {"inner": inner, "outer": outer, "roof": inner[up], "floor": inner[~up]}
     surfaces |= {"crown": outer[out], "base": outer[~out]}
+    height = points[inner].mean(axis=1)[:, -1]
+    surfaces |= {"top": inner[height > 0.7], "bottom": inner[height < -0.7]}
     bent = BodyMesh(points, mesh.cells, surfaces)
     pair = ContactPair(Surface("ring", sides[0]), Surface("ring", sides[1]))
     return Scene({"ring": Body(bent, NeoHooke(1.0, 0.3))}, contacts=[pair])

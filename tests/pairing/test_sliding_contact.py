@@ -226,6 +226,12 @@ def test_nodes_beyond_the_reach_need_no_point() -> None:
     assert sliding(scene, reach=0.03).at(x, near).points.count == 0
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_sides_of_a_body_beyond_the_reach_of_each_other_need_no_point(kind: str) -> None:
+    scene = ring(kind, ("top", "bottom"))
+    assert sliding(scene, reach=0.03).at(scene.points).points.count == 0
+
+
 def test_given_gaps_are_kept_while_bodies_slide() -> None:
     scene = on_arch("hexahedron")
     given = replace(scene, contacts=[replace(scene.contacts[0], gap=0.005)])

@@ -140,6 +140,8 @@ class ClosestPoints:
         pair = np.repeat(waiting, [len(each) for each in lists])
         facet = np.concatenate([np.zeros(0, dtype=np.int64), *map(np.asarray, lists)]).astype(np.int64)
         assert self.apart is not None
+        if not len(pair):  # some versions of scipy take no empty places of a sparse matrix
+            return pair, facet
         allowed = ~np.asarray(self.apart[pair, facet], dtype=bool).ravel()
         return pair[allowed], facet[allowed]
 
