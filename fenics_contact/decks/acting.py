@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -40,31 +41,54 @@ class Acting:
 
     def __init__(self, model: Model, holding: Holding) -> None:
         self.model, self.holding = model, holding
+        #: Where pressures act -> the name of the surface.
+        self.pressed: dict[tuple[str, ...], str] = {}
 
     def name_surfaces(self) -> None:
         """Name the faces that pressures act on."""
-        acting = [pressed for moment in self.model.history.moments for pressed in moment.pressures]
-        sides: dict[str, Pressed] = {}
         taken: dict[tuple[int, int], str] = {}
-        for pressed in acting:
-            name = " ".join(pressed.where)
-            if name in sides:
-                continue
-            sides[name] = pressed
-            faces = self._faces(pressed)
+        for several in self._alike():
+            first = several[0]
+            name = " ".join(first.where)
+            if len(several) > 1:
+                name = next(n for n in map("DLOAD {}".format, count(1)) if n not in self.model.surfaces)
+            faces = self._faces(first) if len(several) == 1 else self._single_faces(several)
             what, remedy = "a pressure must act", "correct the set or the label"
-            self.model.exterior.require(faces, pressed.card, pressed.row, what, remedy)
+            self.model.exterior.require(faces, first.card, first.row, what, remedy)
             for key in zip(faces.elements.tolist(), faces.sides.tolist(), strict=True):
                 other = taken.setdefault(key, name)
                 if other != name:
                     number = self.model.mesh.element_numbers[key[0]]
-                    raise pressed.card.error(
+                    raise first.card.error(
                         f"the same face of element {number} is loaded by {other!r} and {name!r}: load it "
                         "once",
-                        pressed.row,
+                        first.row,
                     )
             self.model.surfaces[name] = faces
-            self.model.origins["load", name] = pressed.card.origin
+            self.model.origins["load", name] = first.card.origin
+            self.pressed.update((each.where, name) for each in several)
+
+    def _alike(self) -> list[list[Pressed]]:
+        """Return the pressures of all moments; those on single elements together that are always equal."""
+        moments = self.model.history.moments
+        first: dict[tuple[str, ...], Pressed] = {}
+        values: dict[tuple[str, ...], list[float]] = {}
+        for number, moment in enumerate(moments):
+            for pressed in moment.pressures:
+                first.setdefault(pressed.where, pressed)
+                values.setdefault(pressed.where, [0.0] * len(moments))[number] = pressed.value
+        found: dict[tuple[object, ...], list[Pressed]] = {}
+        for where, pressed in first.items():
+            single = len(where) == 2 and where[0].isdecimal()
+            found.setdefault(tuple(values[where]) if single else where, []).append(pressed)
+        return list(found.values())
+
+    def _single_faces(self, several: Sequence[Pressed]) -> Faces:
+        """Return the faces of single elements."""
+        mesh, card = self.model.mesh, several[0].card
+        numbers = np.array([int(each.where[0]) for each in several])
+        sides = np.array([int(each.where[1][1:]) - 1 for each in several])
+        return Faces(mesh.positions(numbers, "element", card), sides)
 
     def _faces(self, pressed: Pressed) -> Faces:
         card, row = pressed.card, pressed.row
@@ -125,14 +149,11 @@ class Acting:
                         else NodeValues(mesh.points[inner], each)
                     )
                     found.append(PointForce(body, name, value))
-        for pressed in moment.pressures:
-            name = " ".join(pressed.where)
-            if pressed.value:
-                found += [
-                    Pressure(b, name, pressed.value)
-                    for b, m in self.model.parts.meshes.items()
-                    if name in m.surfaces
-                ]
+        pressures = {self.pressed[pressed.where]: pressed.value for pressed in moment.pressures}
+        for name, value in pressures.items():
+            if value:
+                meshes = self.model.parts.meshes.items()
+                found += [Pressure(body, name, value) for body, mesh in meshes if name in mesh.surfaces]
         for weight in moment.weights:
             found += self._weights(weight)
         for driven, name in self.holding.driven:

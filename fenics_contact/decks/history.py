@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact.decks.initial_stress import kind_of
 from fenics_contact.decks.vocabulary import KNOWN, PRINT_CARDS, PROCEDURES
-from fenics_contact.readers.deck_cards import Card, plain
+from fenics_contact.readers.deck_cards import Card, DeckError, plain
 from fenics_contact.readers.deck_mesh import DeckMesh
 
 
@@ -243,6 +243,7 @@ class _Course:
             self.pressures.clear()
             self.weights.clear()
         by = self._by(card)
+        self._check_single_faces(card)
         for row, entries in enumerate(card.rows):
             label = plain(entries[1]) if len(entries) > 1 else ""
             numbers = tuple(card.floats(row, 2))
@@ -266,12 +267,33 @@ class _Course:
                 load = Weight(where, card, row, label, numbers[0], numbers[1:])
                 self.weights[where, label] = load, by, before.value if before else 0.0
             elif label[:1] == "P" and label[1:].isdecimal() and numbers:
-                self.mesh.faces_of(self.mesh.elements_named(where, card, row), label, card, row)
+                if not where.isdecimal():
+                    self.mesh.faces_of(self.mesh.elements_named(where, card, row), label, card, row)
                 self._press((where, label), card, row, numbers[0], by)
             else:
                 raise card.error(
                     f"load {label!r} is not read: P1, P2, ... on faces of elements, GRAV and CENTRIF are", row
                 )
+
+    def _check_single_faces(self, card: Card) -> None:
+        """Reject single elements and faces that are not there, those of one label at once."""
+        rows: dict[str, list[int]] = {}
+        for row, entries in enumerate(card.rows):
+            label = plain(entries[1]) if len(entries) > 1 else ""
+            if plain(entries[0]).isdecimal() and label[:1] == "P" and label[1:].isdecimal():
+                rows.setdefault(label, []).append(row)
+        for label, some in rows.items():
+            numbers = np.array([plain(card.rows[row][0]) for row in some], dtype=np.float64)
+            there = np.isin(numbers, self.mesh.element_numbers)
+            lost = [row for row, known in zip(some, there.tolist(), strict=True) if not known]
+            for row in lost[:1]:
+                self.mesh.elements_named(plain(card.rows[row][0]), card, row)
+            elements = self.mesh.positions(numbers.astype(np.int64), "element", card)
+            try:
+                self.mesh.faces_of(elements, label, card, some[0])
+            except DeckError:
+                for row, element in zip(some, elements.tolist(), strict=True):
+                    self.mesh.faces_of(np.array([element]), label, card, row)
 
     def _press(self, where: tuple[str, ...], card: Card, row: int, value: float, by: int) -> None:
         known = self.pressures.get(where)

@@ -339,13 +339,16 @@ def _check_facets_belong(mesh: TaggedMesh, surfaces: Facets) -> None:
         faces = cell_faces(one_array({kind: rows}, mesh.dim), mesh.dim)
         known.append(widened(corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim), 2 * (mesh.dim - 1)))
     faces = np.concatenate(known)
-    for name, parts in surfaces.items():
-        for block in parts.facets:
-            lost = np.flatnonzero(match_faces(block, faces) < 0)
-            if lost.size:
-                place = ", ".join(f"{x:.6g}" for x in mesh.points[block[lost[0]]].mean(axis=0))
+    blocks = [(name, block) for name, parts in surfaces.items() for block in parts.facets]
+    for width in {block.shape[1] for _, block in blocks}:
+        some = [(name, block) for name, block in blocks if block.shape[1] == width]
+        lost = match_faces(np.concatenate([block for _, block in some]), faces) < 0
+        ends = np.cumsum([len(block) for _, block in some])[:-1]
+        for (name, block), off in zip(some, np.split(lost, ends), strict=True):
+            if off.any():
+                place = ", ".join(f"{x:.6g}" for x in mesh.points[block[np.argmax(off)]].mean(axis=0))
                 raise InvalidInputError(
-                    f"a surface must consist of faces of cells, {lost.size} of {len(block)} facets of "
-                    f"'{name}' of {mesh.source} are none, first at ({place}): mesh bodies and surfaces "
-                    "together, or leave the surface out with surfaces=[...]"
+                    f"a surface must consist of faces of cells, {np.count_nonzero(off)} of {len(block)} "
+                    f"facets of '{name}' of {mesh.source} are none, first at ({place}): mesh bodies and "
+                    "surfaces together, or leave the surface out with surfaces=[...]"
                 )

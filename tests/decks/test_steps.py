@@ -11,7 +11,8 @@ from mpi4py import MPI
 from fenics_contact import Kept, Support
 from fenics_contact import _cli as cli
 from fenics_contact.decks import DeckError, read_deck
-from tests.decks.texts import BAR, FREE_TO_CONTRACT, deck, step
+from fenics_contact.gallery import block
+from tests.decks.texts import BAR, FREE_TO_CONTRACT, SECTION, STEEL, deck, mesh_cards, step
 
 YOUNG, LENGTH, STRESS, PULL = 210000.0, 3.0, 50.0, 0.01
 #: A traction on the end face by its nodal forces: 3 by 2 nodes, the middle ones of two cells.
@@ -166,3 +167,31 @@ def test_steps_have_the_names_that_the_deck_gives_them(tmp_path: Path) -> None:
     twice = text.replace("*STEP\n", "*STEP, NAME=Press\n")
     with pytest.raises(DeckError, match=r"\*STEP: a step before it has the name 'PRESS', too"):
         read_deck(deck(tmp_path, twice))
+
+
+ON_ITS_BACK = "*BOUNDARY\nBAR_Z0, 1, 3\n"
+
+
+def test_lines_of_single_elements_that_are_always_equal_are_one_load(tmp_path: Path) -> None:
+    """Programs write a pressure face by face: one surface for each course of values, with the same forces."""
+    plate = mesh_cards({"BAR": block((0, 0, 0), (3, 3, 1), (3, 3, 1))}) + STEEL + SECTION + ON_ITS_BACK
+    first = "*DLOAD\n" + "".join(f"{k}, P2, 6.\n" for k in range(1, 10))
+    second = "*DLOAD\n" + "".join(f"{k}, P2, {8 if k < 4 else 6}.\n" for k in range(1, 10)) + "1, P3, 8.\n"
+    found = read_deck(deck(tmp_path, plate + step(first) + step(second)))
+    assert [len(each.loads) for each in found.steps] == [2, 3]
+    mesh = found.scene.bodies["BAR"].mesh
+    sizes = {load.value: len(mesh.surfaces[load.surface]) for load in found.steps[1].loads[:2]}
+    assert sizes == {8.0: 3, 6.0: 6}
+    states = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    forces = [state.balance().loads.force[2] for state in states]
+    assert forces == pytest.approx([-54.0, -3 * 8.0 - 6 * 6.0], rel=1e-9)
+
+
+def test_what_is_wrong_in_lines_of_single_elements_is_named_by_its_line(tmp_path: Path) -> None:
+    plate = mesh_cards({"BAR": block((0, 0, 0), (2, 1, 1), (2, 1, 1))}) + STEEL + SECTION + ON_ITS_BACK
+    lines = (plate + step("*DLOAD\n1, P2, 6.\n2, P2, 6.\n")).splitlines()
+    for wrong, message in (("7, P2, 6.", "element 7 is not there"), ("2, P9, 6.", "face 'P9' is not one of")):
+        text = "\n".join(wrong if line == "2, P2, 6." else line for line in lines)
+        with pytest.raises(DeckError, match=message) as refused:
+            read_deck(deck(tmp_path, text))
+        assert refused.value.line == 1 + lines.index("2, P2, 6.")
