@@ -141,7 +141,13 @@ def joined_around(
     points: ContactPoints, ties: ContactPoints, scene: Scene, *, areas: bool = True
 ) -> ContactPoints:
     """Return points without those of `around_once`, whose areas are part of those that they repeat."""
-    lost, onto = around_once(points, ties, scene)
+    return without_repeated(points, scene, *around_once(points, ties, scene), areas=areas)
+
+
+def without_repeated(
+    points: ContactPoints, scene: Scene, lost: np.ndarray, onto: sp.csr_matrix, *, areas: bool = True
+) -> ContactPoints:
+    """Return points without those that repeat others, see `around_once`; with `areas` these get theirs."""
     if len(lost) == 0:
         return points
     if areas:

@@ -69,9 +69,7 @@ class ConstraintRows:
         """Return those of a scene; `fixed`: see `Relations.rows`."""
         equations, first = _equations(scene, tearing)
         size = _lengths(equations)
-        free = equations @ (
-            sp.diags((~fixed).ravel().astype(float)) if axes is None else free_matrix(fixed, axes)
-        )
+        free = equations @ _onto_free(fixed, axes)
         free = _cleaned(free, size)
         loose = _lengths(free) > HELD * size
         whole = _picked(loose)
@@ -100,6 +98,11 @@ class ConstraintRows:
         return (self.kept @ self.equations).tocsr()
 
     @property
+    def projection(self) -> sp.csr_matrix:
+        """P onto free components, shape (n_nodes · components, n_nodes · components)."""
+        return _onto_free(self.fixed, self.axes)
+
+    @property
     def left_out(self) -> int:
         """Number of equations that follow from others or from supports."""
         return int(self.lost.shape[0])
@@ -118,9 +121,10 @@ class ConstraintRows:
 
         `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
         """
-        return np.asarray(self.whole @ self._moved(prescribed))
+        return np.asarray(self.whole @ self.moved(prescribed))
 
-    def _moved(self, prescribed: np.ndarray) -> np.ndarray:
+    def moved(self, prescribed: np.ndarray) -> np.ndarray:
+        """Return prescribed displacements, zero where free, along the coordinates' axes, (n_dofs,)."""
         known = np.nan_to_num(prescribed)
         return np.asarray((known if self.axes is None else self.axes.to_global(known)).ravel())
 
@@ -159,7 +163,7 @@ class ConstraintRows:
         """
         if not self.left_out:
             return
-        values, given = self._values(constraints), self.equations @ self._moved(prescribed)
+        values, given = self._values(constraints), self.equations @ self.moved(prescribed)
         scale = max(np.abs(values).max(), np.abs(given).max())
         left = np.abs(self._left(values - given))
         if (left > near * scale).any():
@@ -207,6 +211,12 @@ class ConstraintRows:
             mine = slice(int(self.first[constraint]), int(self.first[constraint + 1]))
             return np.asarray(self.equations[mine].T @ forces[mine]).reshape(-1, self.components)
         return np.asarray(self.equations.T @ forces).reshape(-1, self.components)
+
+
+def _onto_free(fixed: np.ndarray, axes: LocalAxes | None) -> sp.csr_matrix:
+    """Return the projection onto free components, see `ConstraintRows`."""
+    free = sp.diags((~fixed).ravel().astype(float))
+    return sp.csr_matrix(free if axes is None else free_matrix(fixed, axes))
 
 
 def _equations(scene: Scene, tearing: Tearing) -> tuple[sp.csr_matrix, np.ndarray]:
@@ -285,10 +295,10 @@ def independent_rows(
     shared = np.bincount(number)[number] > 1 if count else kept
     coupled = np.flatnonzero(shared)
     if len(coupled):
-        kept[coupled] = _pivots(_factored(gram[coupled][:, coupled], regular)) > least
+        kept[coupled] = _pivots(factored(gram[coupled][:, coupled], regular)) > least
     if kept.all():
         return kept, sp.csr_matrix((0, count))
-    factor = _factored(gram[kept][:, kept], regular)
+    factor = factored(gram[kept][:, kept], regular)
     own, right, parts = gram[kept][:, kept], (matrix[kept] @ matrix[~kept].T).tocsc(), []
     for start in range(0, right.shape[1], at_once):
         some = right[:, start : start + at_once].toarray()
@@ -299,7 +309,7 @@ def independent_rows(
     return kept, sp.vstack(parts, format="csr")
 
 
-def _factored(gram: sp.csr_matrix, regular: float) -> SuperLU:
+def factored(gram: sp.csr_matrix, regular: float = 1e-13) -> SuperLU:
     """Factor a positive semidefinite matrix, with its pivots on the diagonal."""
     whole = (gram + regular * sp.identity(gram.shape[0])).tocsc()
     options = {"SymmetricMode": True}

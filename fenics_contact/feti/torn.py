@@ -565,6 +565,13 @@ def _joined(
     met = meeting_points(scene, decomposition, overlap=overlap, told=told)
     known = None if previous is None else previous.numbering
     kept = constraint_rows(scene, decomposition, None if previous is None else previous.constraints)
+    if kept is not None:
+        from fenics_contact.feti.periodic import once_at_periodic_edges
+
+        with together(decomposition.comm):
+            points, ties = met
+            ties = once_at_periodic_edges(ties, kept, scene, prescribed, areas=False)
+            met = once_at_periodic_edges(points, kept, scene, prescribed), ties
     system = _with_rows(scene, decomposition, subdomains, met, known, prescribed, constraints=kept)
     if decomposition.comm.rank == 0:
         _log_held(system.relations[2], decomposition.fixed)
