@@ -30,6 +30,7 @@ from fenics_contact.errors.kinds import safe_log, user_code
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.forces import aligned
+from fenics_contact.results.resolution import BetweenNodes
 from fenics_contact.results.state import State
 
 _LOG = logging.getLogger(__name__)
@@ -273,6 +274,11 @@ class Way:
         self.levels.append(level)
         return level
 
+    @property
+    def _missed(self) -> bool:
+        """Whether surfaces touch between nodes, so that a quantity may be zero that is not."""
+        return any(isinstance(each, BetweenNodes) for each in self._state.peak_doubts)
+
     def _solved(self, problem: ContactProblem) -> State:
         """Return the state on the next mesh. Collective."""
         if not self.levels:
@@ -290,8 +296,9 @@ class Way:
         Where a spot is too small for its cells, or an estimate is above the quantity itself, nothing is
         corrected, and the error is unknown.
         """
-        value = value_of(self._state, self.quantity) if self._doubted else 0.0
-        if value != 0.0:  # what a single point presses follows from the load: its adjoint is rounding
+        unmet = self._missed and not self._state.contact.normal_force.any()  # quantities may not exist
+        value = value_of(self._state, self.quantity) if self._doubted and not unmet else 0.0
+        if value != 0.0 or unmet:  # what a single point presses follows from the load, its adjoint is none
             self._sums.append(float("nan"))
             self._corrected.append(float("nan"))
             return value, value, float("inf")
@@ -343,7 +350,7 @@ class Way:
         """
         last, limits = self.levels[-1], self.limits
         aim = self.wanted * abs(last.value)
-        if last.state_value == 0.0:
+        if last.state_value == 0.0 and not self._missed:
             self.reason = (
                 "the quantity is zero on this mesh, and no error is small relative to that: ask for another "
                 "one, or start on a finer mesh if surfaces touch on that"

@@ -15,7 +15,7 @@ from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.results.resolution import CoarsePeak
+from fenics_contact.results.resolution import BetweenNodes, CoarsePeak
 from fenics_contact.results.state import State
 
 #: Halves marked cells of bodies.
@@ -23,8 +23,11 @@ Refine = Callable[[Scene, Mapping[str, np.ndarray]], SceneRefinement]
 
 
 def doubted_pairs(state: State) -> list[int]:
-    """Return the numbers of the contact pairs whose spot is too small for its cells, or but one facet."""
-    places = {each.place for each in state.peak_doubts if isinstance(each, CoarsePeak)}
+    """Return the numbers of the contact pairs whose spot is too small for its cells, or but one facet.
+
+    Also of those that touch between nodes.
+    """
+    places = {each.place for each in state.peak_doubts if isinstance(each, CoarsePeak | BetweenNodes)}
     closed = state.contact.points.pair[state.contact.normal_force > 0.0]
     pressing = np.bincount(closed, minlength=len(state.scene.contacts))
     few = (pressing > 0) & (pressing <= 2 ** (state.scene.dim - 1))
@@ -73,7 +76,7 @@ class _Spot:
 
     Attributes:
         bodies: Names of the bodies whose cells meet there.
-        points: Places of the points that press, shape (n, dim), [length].
+        points: Places of the points that press, or of the one that comes nearest, shape (n, dim), [length].
         half_width: Half the width of the spot, zero where it is not known, [length].
     """
 
@@ -90,6 +93,8 @@ class _Spot:
         places, shown = (each.bodies[name].mesh.points[nodes] for each in (state.scene, scene))
         sides = [pair.slave, *([pair.master] if isinstance(pair.master, Surface) else [])]
         pressing = contact.normal_force[mine] > 0.0
+        if not pressing.any():  # it touches between nodes: those that come nearest are around
+            pressing[np.argmin(contact.gap[mine])] = True
         bodies = tuple(dict.fromkeys(side.body for side in sides))
         return cls(bodies, shown[pressing], _half_width(state, number, places))
 

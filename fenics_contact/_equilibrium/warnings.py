@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
+from fenics_contact._equilibrium.between_nodes import between_nodes
 from fenics_contact._equilibrium.peaks import coarse_peak, unmatched_nodes
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.body import Body
@@ -66,12 +67,21 @@ class ContactWarnings:
                 if not (design and kind == "overlap"):
                     self._log(state, (pair, kind), words, _LOG.info if kind == "rough peak" else None)
             object.__setattr__(state, "peak_doubts", peaks)
-        elif not state.scene.deforms_much:
-            for number in range(len(state.scene.contacts)):
-                for pair, kind, words in _slid_far(state, number):
-                    self._log(state, (pair, kind), words)
+        else:
+            self._warn_of_deformed(state)
         self._warn_of_large_rotations(state)
         self._warn_of_passing_bodies(state)
+
+    def _warn_of_deformed(self, state: State) -> None:
+        """Warn of pairs of nonlinear materials that slide too far or touch between nodes. Collective."""
+        peaks = list[PeakDoubt]()
+        for number, pair in enumerate(state.scene.contacts):
+            for _, kind, words in [] if state.scene.deforms_much else _slid_far(state, number):
+                self._log(state, (number, kind), words)
+            if missed := between_nodes(state, number):
+                peaks.append(doubt := missed.doubt(pair.place))
+                self._log(state, (number, "inside facets"), doubt.warning)
+        object.__setattr__(state, "peak_doubts", tuple(peaks))
 
     def overlaps(self, state: LinearState) -> tuple[str, ...]:
         """Return words about the pairs whose surfaces overlap before they are loaded. Collective."""
@@ -111,6 +121,10 @@ class ContactWarnings:
             found += _passing_nodes(state, number, moved) + _open_means(state, number, moved)
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
+            missed = None if error > SHARE * moved else between_nodes(state, number, moved)
+            if missed is not None:
+                peaks.append(doubt := missed.doubt(pair.place))
+                found.append((number, "inside facets", doubt.warning))
             if error > SHARE * moved:  # which points press is not known then
                 found.append((number, "facets", _words_of_facets(pair, error, moved)))
             elif peak := coarse_peak(state, number, pressed_in):

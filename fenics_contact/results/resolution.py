@@ -37,10 +37,11 @@ class CoarsePeak:
         """What is uncertain, why, and what to do."""
         points = counted(self.points, "point presses", "points press")
         cells = counted(self.cells, "cell")
+        force = ", and so may the force where displacements are given" if self.cells == 1 else ""
         return (
             f"the contact of {self.place} is too small for its cells: {points}, and it ends within "
-            f"{cells} of the largest pressure, which may be off {OFF[self.cells]}; four cells on the half "
-            f"width of a contact have it to about a percent: refine the meshes there, as {CALL} does"
+            f"{cells} of the largest pressure, which may be off {OFF[self.cells]}{force}; four cells on "
+            f"the half width of a contact have it to about a percent: refine the meshes there, as {CALL} does"
         )
 
     def __str__(self) -> str:
@@ -48,6 +49,42 @@ class CoarsePeak:
         return (
             f"may be off {OFF[self.cells]}, {self.place} touch within {counted(self.cells, 'cell')} of it: "
             f"{CALL} refines the meshes there"
+        )
+
+
+@dataclass(frozen=True)
+class BetweenNodes:
+    """A contact that lies between the nodes of its slave, or partly so.
+
+    Attributes:
+        place: The surfaces of the pair.
+        depth: By how much surfaces overlap inside a facet, deeper than at its nodes, [length].
+        moved: How far they move against each other, [length].
+        at: The deepest point, [length].
+    """
+
+    place: str
+    depth: float
+    moved: float
+    at: tuple[float, ...]
+
+    @property
+    def warning(self) -> str:
+        """What is missed, where, and what to do."""
+        where = ", ".join(f"{x:.4g}" for x in self.at)
+        return (
+            f"the contact of {self.place} lies between nodes: inside a facet of the slave, at ({where}), "
+            f"surfaces overlap by {self.depth:.2g} more than at its nodes, where they move by "
+            f"{self.moved:.2g} against each other: cells are too large for this contact, and its force, not "
+            "only its largest pressure, may be off by a half or more: refine the meshes there, as "
+            f"{CALL} does"
+        )
+
+    def __str__(self) -> str:
+        """Return it in one line."""
+        return (
+            f"may be off by a half or more, and so may the force: {self.place} touch between nodes: {CALL} "
+            "refines the meshes there"
         )
 
 
@@ -70,7 +107,7 @@ class UnmatchedNodes:
 
 
 #: What is uncertain about the largest pressure of a pair.
-PeakDoubt = CoarsePeak | UnmatchedNodes
+PeakDoubt = CoarsePeak | BetweenNodes | UnmatchedNodes
 
 
 def in_words(doubts: Sequence[PeakDoubt]) -> str:

@@ -1,0 +1,276 @@
+"""Where the gap is smaller inside facets of a slave than at their nodes.
+
+A convex master that is narrower than the slave's cells passes between its nodes. The smallest gap in each
+facet is found from samples, and from there by steps along the facet's coordinates that are halved: gaps need
+not have derivatives, and near their minimum they hardly change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.checks import floats
+from fenics_contact._pairing.following import followed_nodes
+from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._pairing.sliding.closest import moved_surface
+from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
+from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.tools import ToolBody
+from fenics_contact._surfaces.facets import (
+    FacetedSurface,
+    corner_places,
+    facet_shape_values,
+    heights,
+    outside,
+)
+from fenics_contact._surfaces.pieces import shape_weights
+from fenics_contact._surfaces.projection import interpolated_normal, node_weights, project
+from fenics_contact.shapes.combined import placed
+from fenics_contact.shapes.simple import SurfaceShape, evaluate_shape
+
+#: Gaps at points of facets: numbers of facets, (n,), local coordinates, (n, dim − 1) -> (n,), [length].
+GapsAt = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+#: Samples along each local coordinate.
+SAMPLES = 5
+#: How often steps are halved.
+HALVINGS = 8
+#: Gaps that differ by less than this part of how much they vary in a facet are the same.
+FLAT = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Deepest:
+    """The points of some facets where the gap is smallest.
+
+    Attributes:
+        facet: Their numbers, ascending, shape (n,).
+        local: Local coordinates, shape (n, dim − 1).
+        gap: Shape (n,), [length].
+        at_nodes: The smallest gap at the corners of each facet, shape (n,), [length].
+    """
+
+    facet: np.ndarray
+    local: np.ndarray
+    gap: np.ndarray
+    at_nodes: np.ndarray
+
+    @property
+    def missed(self) -> np.ndarray:
+        """By how much facets lie deeper in the master than their corners do, shape (n,), [length]."""
+        return np.asarray(np.maximum(np.minimum(self.at_nodes, 0.0) - self.gap, 0.0))
+
+    def part(self, chosen: np.ndarray) -> Deepest:
+        """Return some of them, by indices or a mask."""
+        return Deepest(self.facet[chosen], self.local[chosen], self.gap[chosen], self.at_nodes[chosen])
+
+
+def deepest_points(corners: int, facet: np.ndarray, gaps_at: GapsAt, least: float = 0.0) -> Deepest:
+    """Return the deepest points of those facets that miss more than a depth.
+
+    `corners`: of a facet; `facet`: the facets, ascending, shape (n,); `gaps_at`: gaps at their points;
+    `least`: the depth, [length].
+    """
+    samples, ends = _samples(corners), corner_places(corners)
+    found, at_ends = (_on_all(gaps_at, facet, places) for places in (samples, ends))
+    every = np.concatenate([found, at_ends], axis=1)
+    finite = np.where(np.isfinite(every), every, np.nan)
+    lowest = found.min(axis=1, initial=np.inf)
+    varies = np.nan_to_num(np.nanmax(finite, axis=1, initial=0.0) - np.nanmin(finite, axis=1, initial=0.0))
+    at_nodes = at_ends.min(axis=1, initial=np.inf)
+    # Between samples the gap is lower by no more than a small part of how much it varies.
+    near = np.flatnonzero(lowest < np.minimum(at_nodes, 0.0) - least + 0.1 * varies)
+    facet, lowest, varies, at_nodes = facet[near], lowest[near], varies[near], at_nodes[near]
+    flat = (found[near] <= (lowest + FLAT * varies)[:, None]).astype(float)
+    middle = flat @ samples / flat.sum(axis=1, keepdims=True)
+    alone = samples[np.argmin(found[near], axis=1)]
+    in_middle = gaps_at(facet, middle)
+    local = np.where((in_middle <= lowest + FLAT * varies)[:, None], middle, alone)
+    gap = np.minimum(in_middle, np.where(in_middle <= lowest + FLAT * varies, in_middle, lowest))
+    local, gap = _descended(corners, facet, gaps_at, local, gap, 1e-3 * FLAT * varies)
+    result = Deepest(facet, local, gap, at_nodes)
+    return result.part(result.missed > least)
+
+
+def _on_all(gaps_at: GapsAt, facet: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the gaps at the same places of all facets, shape (n, m)."""
+    count = len(places)
+    return gaps_at(np.repeat(facet, count), np.tile(places, (len(facet), 1))).reshape(len(facet), count)
+
+
+def _samples(corners: int) -> np.ndarray:
+    """Return places in facets, none at corners, shape (m, dim − 1)."""
+    if corners == 3:
+        steps = np.arange(1, SAMPLES + 1) / (SAMPLES + 2)
+        s, t = (each.ravel() for each in np.meshgrid(steps, steps, indexing="ij"))
+        inside = s + t < 1.0 - 0.5 / (SAMPLES + 2)
+        return np.column_stack([s[inside], t[inside]])
+    steps = (2.0 * np.arange(SAMPLES) + 1.0) / SAMPLES - 1.0
+    if corners == 2:
+        return steps[:, None]
+    return np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def _descended(
+    corners: int, facet: np.ndarray, gaps_at: GapsAt, local: np.ndarray, gap: np.ndarray, same: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return lower points of facets, by steps along their coordinates that are halved, and their gaps.
+
+    `same`: changes of gaps that are none, shape (n,), [length].
+    """
+    width, size = local.shape[1], (1.0 if corners == 3 else 2.0) / SAMPLES
+    for _ in range(HALVINGS):
+        size *= 0.5
+        for along in np.concatenate([np.eye(width), -np.eye(width)]):
+            tried = local + size * along
+            inside = outside(tried, corners) == 0.0
+            there = np.full(len(facet), np.inf)
+            there[inside] = gaps_at(facet[inside], tried[inside])
+            lower = there < gap - same
+            local, gap = np.where(lower[:, None], tried, local), np.where(lower, there, gap)
+    return local, gap
+
+
+@dataclass(frozen=True, eq=False)
+class PointsInside:
+    """Points of facets of a slave with what they meet on its master, undeformed.
+
+    Attributes:
+        distance: From the master, infinite where they do not face it, shape (n,), [length].
+        normal: From master to slave, shape (n, dim).
+        own: Weights of the nodes of all bodies in their displacements, shape (n, n_nodes).
+        master: The same of what they meet, empty rows on an obstacle, shape (n, n_nodes).
+    """
+
+    distance: np.ndarray
+    normal: np.ndarray
+    own: sp.csr_matrix
+    master: sp.csr_matrix
+
+    def gap(self, moved: np.ndarray) -> np.ndarray:
+        """Return the gaps after small displacements of all nodes, shape (n_nodes, dim)."""
+        return np.asarray(
+            self.distance + np.einsum("nd,nd->n", self.normal, self.own @ moved - self.master @ moved)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class InsideOf:
+    """The surfaces of a pair, between whose nodes gaps are looked for.
+
+    Attributes:
+        nodes: Nodes of the slave among those of all bodies, shape (n_slave,).
+        master: The surface of another body; None on an obstacle.
+        obstacle: The obstacle where it is; None for a body.
+    """
+
+    scene: Scene
+    pair: ContactPair
+    slave: FacetedSurface
+    nodes: np.ndarray
+    master: FacetedSurface | None
+    obstacle: SurfaceShape | None
+    numbers: NodeNumbers
+
+    @classmethod
+    def of(cls, scene: Scene, pair: ContactPair) -> InsideOf:
+        """Return those of a pair of a scene."""
+        slave, numbers = surface_of(scene, pair.slave, pair.slave_geometry), NodeNumbers.of(scene)
+        nodes = numbers.global_nodes(pair.slave.body, slave.nodes)
+        if isinstance(pair.master, Surface):
+            master = surface_of(scene, pair.master, pair.geometry)
+            return cls(scene, pair, slave, nodes, master, None, numbers)
+        return cls(scene, pair, slave, nodes, None, pair.master, numbers)
+
+    def moved(self, coordinates: np.ndarray, placement: tuple[np.ndarray, np.ndarray] | None) -> InsideOf:
+        """Return them where bodies are that deform much, made of their facets.
+
+        `coordinates`: of all nodes, shape (n_nodes, dim), [length]; `placement`: rotation and translation of
+        the obstacle, None where it rests.
+        """
+        slave = moved_surface(self.slave, coordinates[self.nodes])
+        if isinstance(self.pair.master, Surface):
+            assert self.master is not None
+            nodes = self.numbers.global_nodes(self.pair.master.body, self.master.nodes)
+            return replace(self, slave=slave, master=moved_surface(self.master, coordinates[nodes]))
+        still = self.pair.master
+        still = still.obstacle if isinstance(still, MovingObstacle) else still
+        at = still if placement is None else placed(still, placement[0], floats(placement[1]))
+        return replace(self, slave=slave, obstacle=at)
+
+    def at(self, facet: np.ndarray, local: np.ndarray) -> PointsInside:
+        """Return points of the slave by facet, shape (n,), and local coordinates, shape (n, dim − 1)."""
+        slave, values = self.slave, facet_shape_values(local, self.slave.corners)
+        at_corners = slave.facets[facet]
+        normal, _ = interpolated_normal(values, slave.normals[at_corners])
+        nodes, weights = (at_corners, values) if slave.whole is None else shape_weights(slave, facet, values)
+        if slave.relief is None:
+            place = np.einsum("nk,nkd->nd", weights, slave.points[nodes])
+        else:
+            place = np.einsum("nk,nkd->nd", values, slave.points[at_corners])
+            place += heights(slave, facet, local).value[:, None] * normal
+        row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
+        own = self._on_all(weights, (row, nodes), self.nodes)
+        if self.obstacle is None:
+            return self._on_body(place, normal, own)
+        outward = evaluate_shape(self.obstacle, "normals", place)
+        facing = np.einsum("nd,nd->n", normal, outward) < 0
+        distance = np.where(facing, evaluate_shape(self.obstacle, "distance", place), np.inf)
+        return PointsInside(distance, outward, own, self._on_tool(place))
+
+    def _on_tool(self, place: np.ndarray) -> sp.csr_matrix:
+        """Return the weights of the nodes that carry the motion of a tool, none on other obstacles."""
+        tool = self.pair.master
+        if not isinstance(tool, RigidTool):
+            return sp.csr_matrix((len(place), self.numbers.n_nodes))
+        body = self.scene.bodies[tool.name]
+        assert isinstance(body, ToolBody)
+        weights = body.weights(place)
+        row, node = np.indices(weights.shape)
+        nodes = self.numbers.global_nodes(tool.name, np.arange(body.mesh.n_nodes))
+        return self._on_all(weights, (row.ravel(), node), nodes)
+
+    def _on_body(self, place: np.ndarray, normal: np.ndarray, own: sp.csr_matrix) -> PointsInside:
+        assert self.master is not None
+        assert isinstance(self.pair.master, Surface)
+        hit = project(place, normal, self.master)
+        distance, outward = np.full(len(place), np.inf), -normal
+        distance[hit.point], outward[hit.point] = hit.gap, hit.normal
+        met = node_weights(self.master, hit).tocoo()
+        nodes = self.numbers.global_nodes(self.pair.master.body, self.master.nodes)
+        entries = met.data, (hit.point[met.row], met.col)
+        return PointsInside(distance, outward, own, self._on_all(*entries, nodes, len(place)))
+
+    def _on_all(
+        self,
+        weights: np.ndarray,
+        at: tuple[np.ndarray, np.ndarray],
+        nodes: np.ndarray,
+        count: int | None = None,
+    ) -> sp.csr_matrix:
+        """Return weights at rows and nodes of a surface as rows of all nodes but hanging ones."""
+        row, node = at
+        shape = (len(weights) if count is None else count, self.numbers.n_nodes)
+        rows = sp.csr_matrix((weights.ravel(), (row, nodes[node].ravel())), shape=shape)
+        return (rows @ followed_nodes(self.scene)).tocsr() if self.scene.has_hanging_nodes else rows
+
+    def turning(self, normals: np.ndarray) -> np.ndarray:
+        """Return by how much the surfaces turn against each other over each facet, shape (n_facets,).
+
+        `normals`: of the master at the slave's nodes, NaN where these do not meet it, (n_slave, dim).
+        """
+        tilt = (self.slave.normals + normals)[self.slave.facets]
+        apart = np.linalg.norm(tilt[:, :, None] - tilt[:, None], axis=3)
+        return np.asarray(np.nan_to_num(apart).max(axis=(1, 2)))
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Widths of the facets, shape (n_facets,), [length]."""
+        corners = self.slave.points[self.slave.facets]
+        return np.asarray(np.linalg.norm(np.ptp(corners, axis=1), axis=1))
