@@ -131,17 +131,50 @@ def _of_pair(
     missed = slave.at_nodes(residual - (points.gap - points.distance))
     own = nodal_mean_at(decomposition, field, slave.nodes)[:, : slave.surface.dim]
     places = Places.of(slave.surface, slave.facets(state, weight))
-    found, gap, normal, theirs = _opposite(state, pair, places)
+    along = places.values @ slave.at_nodes(points.normal)
+    found, gap, normal, theirs = _opposite(state, pair, places, along)
     places = places.part(found)
     closing = places.values @ own - theirs[:, : slave.surface.dim]
     opened = gap + np.einsum("nd,nd->n", normal, closing) - places.values @ missed
     return float(places.weight * (places.values @ weight) @ opened)
 
 
+def _nearest(
+    places: Places, master: FacetedSurface
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return which points face a master, gaps and normals along its own, and its nodes' weights there."""
+    hit = project(places.points, places.normal, master)
+    return hit.point, hit.gap, hit.normal, node_weights(master, hit)
+
+
+def _along(
+    places: Places, along: np.ndarray, master: FacetedSurface
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return the same along other directions, in which mortar measures gaps: the slave's normals.
+
+    The master's point straight ahead is the one nearest to where the tangential plane of the first one is
+    met. Where contact on a roller is a quarter of its radius wide, gaps along the master's normals are off by
+    as much as the whole error of a good mesh, however fine that is.
+
+    `along`: from the master to the slave, of any length, shape (n, dim).
+    """
+    first = project(places.points, places.normal, master)
+    normal = along[first.point] / np.linalg.norm(along[first.point], axis=1, keepdims=True)
+    away = first.gap / np.einsum("nd,nd->n", first.normal, normal)
+    ahead = places.points[first.point] - away[:, None] * normal
+    hit = project(ahead, places.normal[first.point], master)
+    chosen = hit.point
+    gap = away[chosen] + hit.gap / np.einsum("nd,nd->n", hit.normal, normal[chosen])
+    return first.point[chosen], gap, normal[chosen], node_weights(master, hit)
+
+
 def _opposite(
-    state: LinearState, pair: ContactPair, places: Places
+    state: LinearState, pair: ContactPair, places: Places, along: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return which points face the master, their gaps and normals, and how it moves there. Collective."""
+    """Return which points face the master, their gaps and normals, and how it moves there. Collective.
+
+    `along`: normals of the contact points, interpolated, shape (n, dim).
+    """
     torn, scene, field = state.torn, state.torn.scene, state.conforming_displacement
     decomposition = torn.decomposition
     tearing, comm = decomposition.tearing, decomposition.comm
@@ -150,8 +183,9 @@ def _opposite(
         nodes = tearing.global_nodes(pair.master.body, master.nodes)
         moved = nodal_mean_at(decomposition, field, nodes)
         with together(comm):
-            hit = project(places.points, places.normal, master)
-        return hit.point, hit.gap, hit.normal, node_weights(master, hit) @ moved
+            found = _along(places, along, master) if pair.by_mortar else _nearest(places, master)
+        found_at, gap, normal, weights = found
+        return found_at, gap, normal, weights @ moved
     every = np.arange(len(places.points))
     with together(comm):
         gap = evaluate_shape(pair.master, "distance", places.points)
