@@ -24,7 +24,7 @@ from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.memory import Subdomains, expected_memory
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.true_shapes import sides_without_shape
-from fenics_contact.design.objective import Objective
+from fenics_contact.design.objective import Objective, can_be_infinite
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.errors.kinds import safe_log, user_code
 from fenics_contact.mesh.refinement import Refinement
@@ -427,6 +427,8 @@ class Way:
 
         Changes count by the growth of the mesh: one that is hardly refined changes it little.
         """
+        if not can_be_infinite(self.quantity):
+            return ""
         estimated = zip(self.levels[2:], self._corrected[2:], strict=True)
         known = [level for level, corrected in estimated if not np.isnan(corrected)][-changes - 1 :]
         steps = np.diff([level.state_value for level in known])

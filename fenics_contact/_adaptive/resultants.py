@@ -34,6 +34,8 @@ class PairForce(Weighable):
         direction: d, of any length: it is divided by it.
     """
 
+    can_be_infinite = False
+
     pair: int
     direction: GivenVector
 
@@ -70,6 +72,8 @@ class SupportForce(Weighable):
         surface: Name of the supported surface.
         direction: d, of any length: it is divided by it.
     """
+
+    can_be_infinite = False
 
     body: str
     surface: str
@@ -151,6 +155,8 @@ def _require_fixed_shape(objective: object, forms: ShapeForms) -> None:
 
 class _AreaOfStatuses(Weighable):
     """An area that changes by the statuses of points, not smoothly: it has no derivatives."""
+
+    can_be_infinite = False
 
     #: Why there is no adjoint.
     without_adjoint: ClassVar[str] = "an area changes by the statuses of points, not smoothly"

@@ -33,6 +33,8 @@ class MeanNear(Weighable, ABC):
         radius: R, [length]; two or more cells.
     """
 
+    can_be_infinite = False
+
     body: str
     at: GivenVector
     radius: float

@@ -124,6 +124,14 @@ class Weighable:
     #: NumPy's numbers leave products to this class.
     __array_ufunc__ = None
 
+    @property
+    def can_be_infinite(self) -> bool:
+        """Whether it may grow without limit as cells get smaller, as stresses at sharp corners do.
+
+        Areas, forces, movements and energies never do; nobody knows it of an objective that does not say.
+        """
+        return True
+
     def __mul__(self, weight: float) -> WeightedSum:
         """Return the objective times a number."""
         return WeightedSum(((weight, cast(Objective, self)),))
@@ -182,6 +190,11 @@ class WeightedSum(Weighable):
                     "object with value and partials, such as TotalPotential()"
                 )
 
+    @property
+    def can_be_infinite(self) -> bool:
+        """Whether one of the terms can."""
+        return any(can_be_infinite(objective) for _, objective in self.terms)
+
     def __mul__(self, weight: float) -> WeightedSum:
         """Return the sum times a number."""
         return WeightedSum(tuple((weight * own, objective) for own, objective in self.terms))
@@ -201,6 +214,11 @@ class WeightedSum(Weighable):
             return sum(terms) if terms else None
 
         return Partials(*(total(each.name) for each in fields(Partials)))
+
+
+def can_be_infinite(objective: Objective) -> bool:
+    """Return whether an objective, which need not derive from `Weighable`, may grow without limit."""
+    return bool(getattr(objective, "can_be_infinite", True))
 
 
 def _terms(objective: Any) -> tuple[tuple[float, Objective], ...]:
@@ -242,6 +260,11 @@ class Maximum(Weighable):
                     "partials, such as LargestPressure()"
                 )
         object.__setattr__(self, "objectives", tuple(given))
+
+    @property
+    def can_be_infinite(self) -> bool:
+        """Whether one of the objectives can."""
+        return any(map(can_be_infinite, self.objectives))
 
     def value(self, state: State, forms: ShapeForms) -> float:
         """Return the largest value. Collective."""

@@ -118,6 +118,8 @@ class TotalPotential(Weighable):
     Not with fluid in contacts.
     """
 
+    can_be_infinite = False
+
     def value(self, state: State, forms: ShapeForms) -> float:
         """Return the total potential energy; raises as `require_linear` does, and with fluid."""
         require_linear(state, self)
@@ -158,6 +160,8 @@ class StrainEnergy(Weighable):
         InvalidInputError: If the scene has a `ThermalStrain`: a part of the strain is then without stress,
             and ½ uᵀK u is no stored energy.
     """
+
+    can_be_infinite = False
 
     def value(self, state: State, forms: ShapeForms) -> float:
         """Return the strain energy; raises as `require_linear` does."""
@@ -358,6 +362,8 @@ class ContactArea(OfPressures):
     To enlarge it, minimise ``-ContactArea()`` or `PressureUnevenness`.
     """
 
+    can_be_infinite = False
+
     def of_points(self, force: np.ndarray, area: np.ndarray) -> OfPoints:
         """Return the area."""
         return _effective_area(force, area)
@@ -384,6 +390,8 @@ class FrictionWork(Weighable):
     Attributes:
         pair: Number of the contact pair in the scene; None for all.
     """
+
+    can_be_infinite = False
 
     pair: int | None = None
 
@@ -536,6 +544,8 @@ class Movement(Weighable):
         >>> Movement("link 2", "grip", (1, 0, 0)).at
         'grip'
     """
+
+    can_be_infinite = False
 
     body: str
     at: str | int

@@ -28,10 +28,19 @@ from fenics_contact import (
     theory,
 )
 from fenics_contact._adaptive.goal_errors import goal_error, value_of
-from fenics_contact._adaptive.levels import AccurateResult, Limits, Way, solve_to
+from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, Way, solve_to
+from fenics_contact._adaptive.resultants import StickArea
 from fenics_contact._base.memory import available_memory
 from fenics_contact._base.progress import Kind
-from fenics_contact.design import Movement, PeakPressure, TotalPotential
+from fenics_contact.design import (
+    FrictionWork,
+    LargestStress,
+    Maximum,
+    Movement,
+    PeakPressure,
+    StrainEnergy,
+    TotalPotential,
+)
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.blocks import split_quadrilaterals
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
@@ -347,6 +356,26 @@ def test_a_stress_at_a_sharp_corner_grows_without_limit():
     found = solve_to(scene, PeakPressure(), 0.01, MPI.COMM_SELF)
     assert not found.reached
     assert "grows without limit as cells get smaller" in found.reason
+
+
+def test_only_pressures_and_stresses_grow_without_limit():
+    """Four values that rise ever faster: of an area of at most 2, as of a peak."""
+    level = Level(10, 10, 1.0, 0.5, 1, 0.1, 0.1, 1.0)
+    levels = [replace(level, unknowns=10 * 2**k, state_value=1.0 + 0.1 * 1.2**k) for k in range(6)]
+    for quantity_, infinite in (
+        (PeakPressure(), True),
+        (LargestStress("block") + TotalPotential(), True),
+        (Maximum((Movement("block", "y1", (0.0, 1.0)), LargestStress("block"))), True),
+        (SimpleNamespace(), True),  # an objective of one's own that does not say
+        (StickArea(0), False),
+        (FrictionWork(), False),
+        (StrainEnergy() + 2.0 * TotalPotential(), False),
+        (Movement("block", "y1", (0.0, 1.0)), False),
+    ):
+        way = Way(quantity_, 0.01, Limits(), MPI.COMM_SELF)
+        way.levels, way._corrected = levels, [each.value for each in levels]
+        way._state = SimpleNamespace(scene=pressed())
+        assert ("grows without limit" in way._singular()) == infinite, quantity_
 
 
 @pytest.mark.parametrize("accuracy", [0.0, 1.0, -0.1, 2.0])
