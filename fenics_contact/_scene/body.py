@@ -19,7 +19,7 @@ from fenics_contact.materials.kernels import motions_of_revolution, rigid_body_m
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
-from fenics_contact.mesh.collapsed import places_of
+from fenics_contact.mesh.collapsed import has_collapsed, places_of
 from fenics_contact.mesh.faces import computed_rounding
 from fenics_contact.mesh.quality import cell_volumes, jacobians
 
@@ -44,6 +44,7 @@ class Body:
             nodes by 2 points in each direction instead of 3, those of other programs' C3D20R, CPE8R, CPS8R
             and CAX8R. They lock less in bending and near incompressibility, and deform in ways that cost no
             energy where a cell shares no face with another one: two cells in each direction are safe.
+            Bodies that also have prisms, pyramids or triangles are integrated in full.
 
     Example:
         >>> from fenics_contact.gallery import rectangle
@@ -194,6 +195,12 @@ def _check_integration(mesh: BodyMesh, integration: str) -> None:
             "reduced integration needs hexahedra of 20 or quadrilaterals of 8 nodes, got "
             f"{mesh.cells_in_words}, which deform without energy by it: leave it out, or take "
             "serendipity(mesh)"
+        )
+    if integration == "reduced" and has_collapsed(mesh.cells, mesh.dim):
+        raise InvalidInputError(
+            "reduced integration needs hexahedra of 20 or quadrilaterals of 8 nodes alone, got "
+            f"{mesh.cells_in_words}: in other shapes its points depend on the order of their nodes; leave it "
+            "out, or make the others a body of their own and glue it on"
         )
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, PointForce, Scene, Support, solve_scene
+from fenics_contact import Body, BodyMesh, PointForce, Scene, Support, solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain, StVenantKirchhoff
-from fenics_contact.mesh import quadratic
+from fenics_contact.mesh import joined_cells, quadratic, serendipity
 from tests.linear.columns import COLUMN, STRIP, bent
 
 STEEL = IsotropicElasticity(1e3, 0.3)
@@ -83,3 +83,26 @@ def test_reduced_integration_needs_cells_of_20_or_8_nodes() -> None:
         Body(quadratic(rectangle((0, 0), (1, 1), (2, 2))), PlaneStrain(1e3, 0.3), integration="reduced")
     with pytest.raises(InvalidInputError, match="must be 'full' or 'reduced'"):
         Body(STRIP, PlaneStrain(1e3, 0.3), integration="Reduced")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("shape", "nodes", "further"),
+    [
+        ("prism", [1, 8, 3, 5, 9, 7], [[2, 0.5, 0], [2, 0.5, 1]]),
+        ("pyramid", [1, 3, 7, 5, 8], [[2, 0.5, 0.5]]),
+        ("triangle", [1, 4, 3], [[2, 0.5]]),
+    ],
+)
+def test_bodies_of_several_shapes_are_integrated_in_full(shape: str, nodes: list[int], further: list) -> None:
+    """Two points a direction of a prism depend on the vertex that it lists first: 0.30 to 1.43 for 0.24."""
+    dim = len(further[0])
+    whole = block((0, 0, 0), (1, 1, 1), (1, 1, 1)) if dim == 3 else rectangle((0, 0), (1, 1), (1, 1))
+    order = np.lexsort(whole.points.T)
+    place = np.append(order, len(order) + np.arange(len(further)))
+    given = {"hexahedron" if dim == 3 else "quadrilateral": whole.cells, shape: place[[nodes]]}
+    points = np.vstack([whole.points, further])
+    mesh = serendipity(quadratic(BodyMesh(points, joined_cells(given, dim))))
+    law = STEEL if dim == 3 else PlaneStrain(1e3, 0.3)
+    assert Body(mesh, law).integration == "full"
+    with pytest.raises(InvalidInputError, match=rf"8 nodes alone, got 1 .*{shape} and 1 .*leave it out"):
+        Body(mesh, law, integration="reduced")
