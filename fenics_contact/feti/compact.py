@@ -27,7 +27,7 @@ class Inside:
         self.dofs = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
         rows = stiffness[self.dofs]
         self._K_ib, self._K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
-        self._factor = Factor(rows[:, self.dofs].tocsr()) if len(self.dofs) else None
+        self._factor = Factor.of_stiffness(rows[:, self.dofs].tocsr()) if len(self.dofs) else None
         if not held:
             subdomain.matrix.forget()
 

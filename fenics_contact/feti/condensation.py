@@ -12,7 +12,7 @@ from scipy.linalg import blas, lapack
 from fenics_contact._base.libraries import PETSc
 from fenics_contact._base.sparse import dispose_with
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti.factor import Factor, petsc_call, symmetric_matrix
+from fenics_contact.feti.factor import ONE_LAYER, Factor, petsc_call, symmetric_matrix
 
 
 class Condensation:
@@ -57,7 +57,8 @@ class Condensation:
         inside = np.ones(stiffness.shape[0], dtype=bool)
         inside[self._interface] = False
         between = stiffness[inside][:, self._interface]
-        bent = Factor(stiffness[inside][:, inside].tocsr()).solve_many(between.toarray(order="F"))
+        inner = Factor.of_stiffness(stiffness[inside][:, inside].tocsr())
+        bent = inner.solve_many(between.toarray(order="F"))
         own = stiffness[self._interface][:, self._interface].toarray(order="F")
         return np.asfortranarray(own - between.T @ bent)
 
@@ -107,19 +108,24 @@ def regular_factor(
     diagonal entry of S. Where that is rounding compared with the typical stiffness, every displacement of the
     interface is a rigid motion, as in a statically determinate body.
 
-    `rounded`: entries of S below this fraction of those of K are rounding.
+    `rounded`: entries of S below this fraction of those of K are rounding, pivots below it of their entry.
+
+    Raises:
+        InvalidInputError: If S has another kernel than that given.
     """
     modes, _ = np.linalg.qr(kernel)
     largest = schur.diagonal().max()
     rho = largest if largest > rounded * typical else typical
     filled = blas.dsyrk(rho, modes, beta=1.0, c=schur, lower=1, overwrite_c=1)
+    least = rounded * filled.diagonal()
     factor, failed = lapack.dpotrf(filled, lower=1, overwrite_a=1)
-    if failed:
+    # Where a motion has no energy its pivot is rounding, which may be positive.
+    tiny = factor.diagonal() ** 2 <= least
+    if failed or tiny.any():
         raise InvalidInputError(
             "the stiffness of every subdomain must be positive definite up to its kernel, but its Schur "
-            f"complement loses definiteness in row {failed}: check the material and the kernel of the model; "
-            "one layer of cells by reduced integration (C3D20R in decks) that is in contact or tied may move "
-            "without energy: integrate it fully, or take two layers"
+            f"complement loses definiteness in row {failed or int(tiny.argmax()) + 1}: check the material "
+            f"and the kernel of the model; {ONE_LAYER}"
         )
     return factor, modes, float(rho)
 

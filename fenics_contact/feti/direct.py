@@ -66,7 +66,7 @@ class DirectSystem:
             return
         with (timer or PhaseTimer()).phase("factor"):
             free = self._stiffness[self._free][:, self._free].tocsr()
-            self._factor = Factor(free) if len(self._free) else None
+            self._factor = Factor.of_stiffness(free) if len(self._free) else None
 
     @property
     def _stiffness(self) -> sp.csr_matrix:

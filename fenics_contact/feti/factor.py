@@ -12,10 +12,15 @@ import scipy.sparse as sp
 
 from fenics_contact._base.libraries import PETSc, check_not_forked
 from fenics_contact._base.sparse import dispose_with
-from fenics_contact.errors import ConvergenceError
+from fenics_contact.errors import ConvergenceError, InvalidInputError
 
 #: Enough nodes to fix all rigid motions of a body that is not a line, few enough to keep the factor sparse.
 FIXING_NODES = 4
+#: What leaves motions without energy, and what to do.
+ONE_LAYER = (
+    "one layer of cells by reduced integration (C3D20R in decks) that is in contact or tied may move without "
+    "energy: integrate it fully, or take two layers"
+)
 
 
 class Factor:
@@ -39,6 +44,39 @@ class Factor:
         pc.destroy()
         given.destroy()
         dispose_with(self, self._factor, self._right, self._left)
+
+    @classmethod
+    def of_stiffness(cls, matrix: sp.csr_matrix, worst: float = 0.02) -> Factor:
+        """Factor a stiffness that resists every motion.
+
+        Pivots that are rounding may be positive: a solution shows them.
+
+        `matrix`: shape (n, n); `worst`: error of a solution, see `error_of_a_solution`, that is refused.
+
+        Raises:
+            InvalidInputError: If some motion has no energy but rounding.
+        """
+        factor = cls(matrix)
+        error = factor.error_of_a_solution(matrix)
+        if not error < worst:
+            raise InvalidInputError(
+                "a factored stiffness must resist every motion, but of a solution that is known components "
+                f"are off by {error:.2g} of themselves, so that some motion costs no energy but rounding: "
+                f"{ONE_LAYER}; or a body is too slender, its cells are too flat, or its materials too "
+                "different for double precision"
+            )
+        return factor
+
+    def error_of_a_solution(self, matrix: sp.csr_matrix) -> float:
+        """Return the largest relative error of components of a solution that is known, ±1 / √K_ii.
+
+        It is about the rounding of the scaled matrix over its smallest eigenvalue.
+        """
+        weight = np.sqrt(np.abs(matrix.diagonal()))
+        weight[weight == 0.0] = 1.0
+        known = np.random.default_rng(0).choice((-1.0, 1.0), self.size) / weight
+        self.solve(matrix @ known, found := np.empty(self.size))
+        return float(np.abs(weight * (found - known)).max())
 
     def _set_up(self, pc: PETSc.PC, given: PETSc.Mat) -> None:
         """Choose a library and factor."""

@@ -57,7 +57,7 @@ class ExplicitOperator:
         self._inside = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
         rows = stiffness[self._inside]
         self._K_ib, self._K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
-        self._inner = Factor(rows[:, self._inside].tocsr()) if len(self._inside) else None
+        self._inner = Factor.of_stiffness(rows[:, self._inside].tocsr()) if len(self._inside) else None
 
     @property
     def flops(self) -> tuple[int, int]:
@@ -307,8 +307,8 @@ class ImplicitOperator(FactoredOperator):
         super().__init__(
             stiffness,
             interface,
-            Factor(regularised(stiffness, subdomain.kernel, subdomain.points)),
-            Factor(stiffness[inside][:, inside].tocsr()) if len(inside) else None,
+            Factor.of_stiffness(regularised(stiffness, subdomain.kernel, subdomain.points)),
+            Factor.of_stiffness(stiffness[inside][:, inside].tocsr()) if len(inside) else None,
         )
 
 
