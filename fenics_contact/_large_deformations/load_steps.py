@@ -300,7 +300,8 @@ class AutomaticSteps:
         assert at.contact is not None
         way = _Way(self, equations, first, target, at.contact, timer)
         now = Progress(at, first.torn, known, (at, first.torn), at.contact.start)
-        part, longest = self.first, equations.contact.longest_part(first, target)
+        part = self.first
+        longest = min(each.longest_part(first, target) for each in (equations.contact, equations.rigid_start))
         smallest = max(self.smallest, self.smallest_before_snap) if self.snaps else self.smallest
         while now.reached < 1.0:
             left = 1.0 - now.reached

@@ -11,7 +11,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
-from fenics_contact._large_deformations.rigid_surfaces import Motions, TurnedSurface, tracked_motions
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._large_deformations.rigid_surfaces import (
+    FARTHEST_TURN,
+    Motions,
+    TurnedSurface,
+    tracked_motions,
+)
 from fenics_contact._scene.fields import Ufl, evaluate
 from fenics_contact._scene.loads import ThermalStrain
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -121,6 +127,20 @@ class Loading:
         pairs = zip_longest(first.heat, self.heat)
         heat = tuple(_between(one, other, part) for one, other in pairs)
         return Loading(torn, prescribed, time, tuple(weighted), heat=heat).with_surfaces(turned)
+
+    def longest_part(self, first: Loading) -> float:
+        """Return the part of the way from another load to this in which no rigid surface turns too far.
+
+        Against none that rests and against no other: from one displacement to another bodies come the shorter
+        way round, after a full turn none at all.
+        """
+        before = {each.place: each for each in first.turned}
+        turns = [each.turn_from(before.get(each.place)) for each in self.turned if each.far]
+        if not turns:
+            return 1.0
+        ways = np.array([0.0 * turns[0], *turns])
+        farthest = float(np.linalg.norm(ways[:, None] - ways, axis=2).max())
+        return min(1.0, FARTHEST_TURN / max(farthest, FARTHEST_TURN))
 
     def with_surfaces(self, turned: tuple[TurnedSurface, ...]) -> Loading:
         """Return the load with rigid surfaces that have moved elsewhere."""
@@ -349,6 +369,7 @@ class RigidStart:
     def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
         """Keep where the nodes are."""
         self._points, self._decomposition = scene.points, decomposition
+        self._alone = not (scene.contacts or scene.ties or scene.constraints)
         offset = decomposition.tearing.node_offset
         bodies = (scene.bodies[name] for name in decomposition.tearing.body_names)
         self._bodies = [
@@ -377,6 +398,24 @@ class RigidStart:
             moved, rest = result.reshape(-1, len(shift)), self._points[node[own]]
             moved[block[own]] = (rest + moved[block[own]]) @ rotation.T + shift - rest
         return result
+
+    def longest_part(self, first: Loading, last: Loading) -> float:
+        """Return the part between two loads in which bodies follow their rigid surfaces; see `Loading`.
+
+        Those that nothing else holds start as rigid ones, however far they turn.
+        """
+        lone = self._alone and all(self._turn_alone(nodes, first, last) for nodes in self._bodies)
+        return 1.0 if lone else last.longest_part(first)
+
+    def _turn_alone(self, nodes: slice, first: Loading, last: Loading) -> bool:
+        """Return whether rigid surfaces that all turn alike hold a body, and nothing else does."""
+        before = {each.place: each for each in first.turned}
+        own = [each for each in last.turned if nodes.start <= each.nodes[0] < nodes.stop]
+        turns = [each.turn_from(before.get(each.place)) for each in own]
+        held = ~np.isnan(last.prescribed[nodes]).all(axis=1)
+        for each in own:
+            held[each.nodes - nodes.start] = each.free.any()
+        return not held.any() and all(np.allclose(turn, turns[0], rtol=0.0, atol=ROUNDING) for turn in turns)
 
     def _facts(self) -> dict[str, object]:
         return {"bodies": len(self._bodies)}

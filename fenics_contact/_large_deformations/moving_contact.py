@@ -502,8 +502,9 @@ class MovingContact(Contact):
         """Return the part in which what nodes may pass moves by a few facets. Collective."""
         if np.isinf(self._facet):
             return 1.0
-        way = np.nan_to_num(last.prescribed - first.prescribed)
-        moved = float(np.linalg.norm(way, axis=1).max(initial=0.0))
+        part = last.longest_part(first)
+        way = np.nan_to_num(last.between(first, part).prescribed - first.prescribed)
+        moved = float(np.linalg.norm(way, axis=1).max(initial=0.0)) / part
         corners = np.array([self._places[self._nodes].min(axis=0), self._places[self._nodes].max(axis=0)])
         with together(last.torn.numbering.comm):
             times = first.time, last.time

@@ -35,6 +35,11 @@ from fenics_contact.feti.torn import TornSystem
 #: U, then θ, of rigid surfaces by the names of body and surface.
 Motions: TypeAlias = Mapping[tuple[str, str], np.ndarray]
 
+#: Largest angle by which a surface turns in one part of a load step, against what rests and against others:
+#: below half a turn there is no shorter way round. Half of it costs a bent strip up to 13 % more products or
+#: saves 6 %, with twice of it 0.66 of a turn comes out as −0.34.
+FARTHEST_TURN = 2.0 * np.pi / 3.0
+
 
 @displayed
 @dataclass(frozen=True, eq=False)
@@ -88,6 +93,11 @@ class TurnedSurface:
 
         springs = self.springs if first is None else mixed("springs")
         return replace(self, motion=mixed("motion"), load=mixed("load"), springs=springs)
+
+    def turn_from(self, first: TurnedSurface | None) -> np.ndarray:
+        """Return the rotation that is given on the way from another motion, from rest, (1,) or (3,)."""
+        start = np.zeros_like(self.motion) if first is None else first.motion
+        return np.where(self.free, 0.0, self.motion - start)[self.surface.dim :]
 
     def at(self, motions: Motions) -> TurnedSurface:
         """Return it with the free components of other motions, zero by default."""

@@ -45,8 +45,14 @@ from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.feti.subdomain import assemble, cut_out
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.materials import IsotropicElasticity, J2Plasticity, NeoHooke, PlaneStrain
-from fenics_contact.mesh import bisection_partition
+from fenics_contact.materials import (
+    IsotropicElasticity,
+    J2Plasticity,
+    NeoHooke,
+    PlaneStrain,
+    StVenantKirchhoff,
+)
+from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.qp import Smalse
 from tests.models.deformed import rotation, skew_patch, smooth_field
 from tests.nonlinear.scenes import RUBBER, cut
@@ -158,6 +164,26 @@ def test_a_twisted_rod_has_a_moment_about_its_axis_alone() -> None:
     stiffness = little[1].moment[2] / 0.01
     assert 0.0 < far[1].moment[2] < 1.1 * stiffness * 0.5 * np.pi
     assert far[1].force[2] < -1e-3, "twisted rubber wants to be longer: it pushes its ends apart"
+
+
+@pytest.mark.parametrize("turns", [(0.0, 1.0), (-0.4, 0.4)])
+def test_a_strip_is_bent_along_the_arc_of_its_end_in_one_load_step(turns: tuple[float, float]) -> None:
+    """By pure bending M = E I φ / L: one of 0.9 of a turn and more came out as turned the other way round."""
+    length, young = 40.0, 1e3
+    strip = quadratic(rectangle((0.0, -0.5), (length, 0.5), (16, 1)))
+    holds = [
+        RigidSurface("strip", side, (x, 0.0), motion, 2.0 * np.pi * part)
+        for side, x, motion, part in zip(("x0", "x1"), (0.0, length), ((0.0, 0.0), None), turns, strict=True)
+    ]
+    scene = Scene({"strip": Body(strip, StVenantKirchhoff(young, 0.0))}, holds)
+    state = solve_scene(scene, MPI.COMM_SELF)
+    angle = 2.0 * np.pi * (turns[1] - turns[0])
+    moment = float(np.ravel(state.reactions()["strip x1"].moment)[-1])
+    assert moment == pytest.approx(young / 12.0 * angle / length, rel=0.05)
+    tips = [int(np.flatnonzero((strip.points == (x, 0.0)).all(axis=1))[0]) for x in (0.0, length)]
+    start, end = (strip.points + state.gather_displacement("strip"))[tips]
+    exact = 2.0 * length / angle * np.sin(0.5 * angle)
+    assert np.linalg.norm(end - start) == pytest.approx(abs(exact), abs=0.02 * length)
 
 
 def test_functions_of_time_have_their_values_on_the_way() -> None:
