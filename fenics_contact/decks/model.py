@@ -24,6 +24,7 @@ from fenics_contact.decks.multi_point import mean_equations, read_means, read_po
 from fenics_contact.decks.regions import split_sections
 from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.quality import AT_GAUSS_POINTS, jacobians, thickness
 from fenics_contact.readers.deck_bodies import (
     Component,
     Exterior,
@@ -189,6 +190,7 @@ class Model:
                 self._note_units(section.card, given[region], mesh)
             material = given if len(given) > 1 else next(iter(given.values()))
             integration = integration_of(self.mesh, part, self.note)
+            self._note_corners(part, mesh)
             if mesh.centres is None:
                 integration = "full"
             revolved = self.kind == "axisymmetric"
@@ -233,6 +235,21 @@ class Model:
                 card,
                 f"odd units? a Young's modulus of {young:g} is that of a metal in Pa, the body is {size:.4g} "
                 "long: with it lengths are in metres",
+            )
+
+    def _note_corners(self, part: Component, mesh: BodyMesh) -> None:
+        """Report elements that are turned inside out at a corner, but not at their Gauss points."""
+        bad = np.flatnonzero(thickness(mesh.points, mesh.cells) <= 0.0)
+        if len(bad):
+            least = jacobians(mesh.points, mesh.cells[bad]).min(axis=1)
+            inside = jacobians(mesh.points, mesh.cells[bad], AT_GAUSS_POINTS).min()
+            number = self.mesh.element_numbers[self.in_cell_order(part)[bad[np.argmin(least)]]]
+            card = self.mesh.blocks[self.mesh.block_of[self.in_cell_order(part)[bad[0]]]].card
+            self.note(
+                card,
+                f"the Jacobian of {len(bad)} elements of body {part.name} is not positive at a corner or "
+                f"an edge, down to {least.min():.3g} in element {card.told(number)}; it is {inside:.3g} and "
+                "more at their Gauss points, which count: bend them less where results matter",
             )
 
     def _heated(self) -> bool:

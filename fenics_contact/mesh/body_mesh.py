@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Hashable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
@@ -28,9 +29,17 @@ from fenics_contact.mesh.faces import (
 from fenics_contact.mesh.hanging import Centres, DependentNodes, HangingNodes, nodes_to_hold
 from fenics_contact.mesh.linear_facets import has_both, linear_facets
 from fenics_contact.mesh.quadratic_nodes import check_node_order
-from fenics_contact.mesh.quality import check_shapes, jacobian_ratio, similarity, thickness
+from fenics_contact.mesh.quality import (
+    AT_GAUSS_POINTS,
+    check_shapes,
+    jacobian_ratio,
+    similarity,
+    thickness,
+)
 from fenics_contact.shapes.combined import placed
 from fenics_contact.shapes.simple import SurfaceShape
+
+_LOG = logging.getLogger(__name__)
 
 _FOLLOWING = ("quadratic", "serendipity")
 """How cells are called, and how those whose centres follow."""
@@ -79,13 +88,20 @@ def checked_cells(cells: ArrayLike, n_nodes: int, dim: int) -> np.ndarray:
     return array
 
 
-def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
+def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str, given: bool = False) -> None:
     """Reject a mesh with an inverted or degenerate cell, or so far from the origin that rounding bends cells.
 
-    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, nodes of a cell).
+    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, nodes of a cell); `given`:
+    whether the mesh is one that others made, of which Gauss points decide: a corner that is turned inside out
+    is reported, as other programs solve such meshes, too.
     """
     thick = thickness(points, cells)
     inverted = np.flatnonzero(thick <= 0.0)
+    if given and inverted.size:
+        at_points = thickness(points, cells[inverted], AT_GAUSS_POINTS)
+        if (at_points > 0.0).any():
+            _report_corners(points, cells[inverted[at_points > 0.0]])
+        thick[inverted], inverted = at_points, inverted[at_points <= 0.0]
     if inverted.size == 0:
         _check_resolved(points, thick)
         return
@@ -97,6 +113,18 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
         f"flat; the worst is cell {inverted[worst]} at ({centre}) with a "
         f"Jacobian ratio (smallest over largest) of {ratios[worst]:.3g}: {remedy}"
     )
+
+
+def _report_corners(points: np.ndarray, cells: np.ndarray) -> None:
+    """Report cells that are turned inside out where they are not integrated."""
+    ratios = jacobian_ratio(points, cells)
+    worst = int(np.argmin(ratios))
+    at = ", ".join(f"{x:.6g}" for x in points[cells[worst]].mean(axis=0))
+    _LOG.warning(
+        "%d cells are turned inside out at a corner or an edge, the worst around (%s) with a Jacobian ratio "
+        "(smallest over largest) of %.3g; at their Gauss points, which count, they are not: bend them less "
+        "where results matter", len(cells), at, ratios[worst],
+    )  # fmt: skip
 
 
 def _check_resolved(points: np.ndarray, thick: np.ndarray) -> None:
@@ -303,7 +331,7 @@ class BodyMesh:
         curved = "refine the mesh along its curved surfaces, or take linear cells"
         straight = "list the vertices of the cells in VTK order and check the coordinates"
         try:
-            check_jacobians(points, cells, straight if self.order == 1 else curved)
+            check_jacobians(points, cells, straight if self.order == 1 else curved, given=True)
         except InvalidInputError:
             if self.order > 1:
                 check_node_order(points, cells)

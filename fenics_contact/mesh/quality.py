@@ -53,13 +53,18 @@ def _critical_positions(cell: CellType) -> np.ndarray:
     return HEXAHEDRON_LATTICE if cell.dim == 3 else cell.vertices
 
 
+AT_GAUSS_POINTS = np.zeros((0, 0))
+"""In place of positions: those at which cells are integrated."""
+
+
 def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | None = None) -> np.ndarray:
     """Evaluate the Jacobian determinant of the map from the reference cell.
 
     `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, nodes of a cell); `positions`:
     reference coordinates, (m, 3 | 2), for all but linear simplices; unless given the 27 points of
-    `HEXAHEDRON_LATTICE`, the four vertices, or nodes and Gauss points of quadratic cells. A linear simplex
-    has one constant Jacobian: six times its volume, or twice its area.
+    `HEXAHEDRON_LATTICE`, the four vertices, or nodes and Gauss points of quadratic cells; `AT_GAUSS_POINTS`
+    for those at which cells of whatever shape are integrated. A linear simplex has one constant Jacobian: six
+    times its volume, or twice its area.
 
     The result has shape (n_cells, m), or (n_cells, 1) for linear simplices, in units of volume (area).
     """
@@ -67,8 +72,8 @@ def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | Non
     if cell.is_affine:
         corners = points[cells]
         return determinants(corners[:, 1:] - corners[:, :1])[:, None]
-    if positions is None:
-        positions = _critical_positions(cell)
+    if positions is None or positions is AT_GAUSS_POINTS:
+        positions = _critical_positions(cell) if positions is None else quadrature(cell)[0]
         if (groups := shapes_in(cells, cell.dim)) is not None:
             return _of_shapes(points, cells, positions, groups)
     corners = places_of(points, cells)
@@ -173,8 +178,10 @@ def node_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return np.bincount(cells.ravel(), shares, len(points))
 
 
-def thickness(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+def thickness(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | None = None) -> np.ndarray:
     """Return the smallest Jacobian of every cell over the area (length) of its bounding box's diagonal.
+
+    `positions`: as of `jacobians`.
 
     Returns:
         (n_cells,) [length]; 0 where a cell is inverted or flat, else a fraction of the diagonal.
@@ -183,7 +190,8 @@ def thickness(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     def of(cells: np.ndarray) -> np.ndarray:
         corners = points[cells]
         size = np.linalg.norm(corners.max(axis=1) - corners.min(axis=1), axis=1)
-        smallest = jacobians(points, cells).min(axis=1) / np.maximum(size, 1e-100) ** points.shape[1]
+        least = jacobians(points, cells, positions).min(axis=1)
+        smallest = least / np.maximum(size, 1e-100) ** points.shape[1]
         return np.asarray(np.where(smallest <= LAST_PLACES, 0.0, smallest) * size)
 
     return _in_parts(cells, of)

@@ -79,7 +79,8 @@ def serendipity(mesh: BodyMesh) -> BodyMesh:
     result = copy(mesh)
     result.__dict__.pop("linear", None)
     points = centres.placed(mesh.points)
-    check_jacobians(points, mesh.cells, "refine the mesh along its curved surfaces, or keep complete cells")
+    remedy = "refine the mesh along its curved surfaces, or keep complete cells"
+    check_jacobians(points, mesh.cells, remedy, given=True)
     result._set(points=points, centres=centres, chart=None)
     return result
 

@@ -15,7 +15,7 @@ from fenics_contact._base.checks import require_file
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.quadratic_nodes import with_centres
-from fenics_contact.mesh.quality import thickness
+from fenics_contact.mesh.quality import AT_GAUSS_POINTS, jacobians, thickness
 from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, one_array
 from fenics_contact.readers.deck_assembly import read_cards
 from fenics_contact.readers.deck_cards import Card
@@ -283,20 +283,25 @@ def regions_of(sections: Sequence[Section], part: Component) -> dict[str, Sectio
 
 
 def _check_block(block: Block, points: np.ndarray) -> None:
-    """Reject elements without a positive Jacobian, by their numbers."""
+    """Reject elements without a positive Jacobian at their Gauss points, by their numbers."""
     places, whole = with_centres(points, {block.element.name: block.nodes}, block.element.dim)
     cells = one_array(whole, block.element.dim)
     bad = np.flatnonzero(thickness(places, cells) <= 0.0)
+    bad = bad[thickness(places, cells[bad], AT_GAUSS_POINTS) <= 0.0] if len(bad) else bad
     if len(bad):
+        least = jacobians(places, cells[bad], AT_GAUSS_POINTS).min(axis=1)
+        worst = int(np.argmin(least))
+        at = ", ".join(f"{x:.6g}" for x in places[cells[bad[worst]]].mean(axis=0))
         first = map(block.card.told, block.numbers[bad[:5]].tolist())
         numbers = ", ".join(first) + (", ..." if len(bad) > 5 else "")
         ends = np.cumsum([line.strip().rstrip(",").count(",") + 1 for line in block.card.lines])
         width = 1 + len(block.element.written)
         row = int(np.searchsorted(ends, block.records[bad[0]] * width, side="right"))
         raise block.card.error(
-            f"every element must have a positive Jacobian, {len(bad)} of {len(cells)} of type "
-            f"{block.element.name} are inverted or flat: {numbers}; see the order of their nodes, and their "
-            "coordinates", row,
+            f"every element must have a positive Jacobian at its Gauss points, {len(bad)} of {len(cells)} "
+            f"of type {block.element.name} are inverted or flat: {numbers}; the smallest is "
+            f"{least[worst]:.3g} in element {block.card.told(block.numbers[bad[worst]])} around ({at}): see "
+            "the order of their nodes, and their coordinates", row,
         )  # fmt: skip
 
 

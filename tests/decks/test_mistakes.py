@@ -31,7 +31,7 @@ WRONG = [
         "1, 1, 5, 7, 3, 2, 6, 8, 4",
         "1, 5, 1, 3, 7, 2, 6, 8, 4",
         "1, 5, 1, 3",
-        r"positive Jacobian, 1 of 2 .* C3D8 are inverted or flat: 1;",
+        r"positive Jacobian at .*, 1 of 2 .* C3D8 are inverted or flat: 1;",
     ),
     (
         "1, 1, 5, 7, 3, 2, 6, 8, 4",
