@@ -35,6 +35,7 @@ from fenics_contact.output.files import OutputError
 from fenics_contact.output.result import listed_forces, scales_of
 from fenics_contact.output.tables import rounded
 from fenics_contact.results.by_name import names_of
+from fenics_contact.results.contact import NormalForces
 from fenics_contact.results.resolution import in_words
 from fenics_contact.results.state import State, pairs_in_words
 
@@ -306,16 +307,20 @@ def step_table(rows: Sequence[Mapping[str, Any]], file: SceneFile) -> Table:
     table = Table(
         title=f"{file.title}: load steps", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
     )
-    table.add_column("", justify="right")
-    table.add_column("step", no_wrap=True)
-    for name in (
-        "iterations", "products", "open", "stick", "slip", f"normal force\n({force})",
-        f"friction\n({force})", f"largest pressure\n({units.stress})",
-        *(f"{name}\n({force})" for name in names_of(file.scene.preloads)),
-    ):  # fmt: skip
-        table.add_column(name, justify="right")
+    curved = any(NormalForces(row["normal_force"], row["normal_resultant"]).differ() for row in rows)
+    named = {
+        "number": "", "name": "step",
+        **{name: name for name in ("iterations", "products", "open", "stick", "slip")},
+        "normal_force": f"sum of normal\nforces ({force})" if curved else f"normal force\n({force})",
+        **({"normal_resultant": f"their resultant\n({force})"} if curved else {}),
+        "friction_force": f"friction\n({force})", "peak_pressure": f"largest pressure\n({units.stress})",
+        **{f"preload {name}": f"{name}\n({force})" for name in names_of(file.scene.preloads)},
+    }  # fmt: skip
+    for name, words in named.items():
+        table.add_column(words, justify="left" if name == "name" else "right", no_wrap=name == "name")
     for row in rows:
-        table.add_row(*(f"{value:.6g}" if isinstance(value, float) else str(value) for value in row.values()))
+        values = (row[name] for name in named)
+        table.add_row(*(f"{value:.6g}" if isinstance(value, float) else str(value) for value in values))
     return table
 
 

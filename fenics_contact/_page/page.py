@@ -267,7 +267,8 @@ def _contact(record: Record, units: Units) -> str:
         rows += [
             (words, f"{number(entry[name])} {unit}")
             for name, words, unit in (
-                ("normal_force", "normal force", force),
+                ("normal_force", "sum of normal forces", force),
+                ("normal_resultant", "their resultant", force),
                 ("peak_pressure", "largest pressure", units.stress),
                 ("peak_nominal_pressure", "largest nominal pressure", units.stress),
                 ("area", "area in contact", units.length if _plane(record) else f"{units.length}²"),
@@ -311,7 +312,8 @@ def _steps(record: Record, units: Units) -> str:
     force, _ = _force_units(record, units)
     named = {
         "number": "", "name": "step", "iterations": "iterations", "products": "products", "open": "open",
-        "stick": "stick", "slip": "slip", "normal_force": f"normal force ({force})",
+        "stick": "stick", "slip": "slip", "normal_force": f"sum of normal forces ({force})",
+        "normal_resultant": f"their resultant ({force})",
         "friction_force": f"friction ({force})", "peak_pressure": f"largest pressure ({units.stress})",
     }  # fmt: skip
     drawn = [name for name in steps if name.startswith("preload ")]

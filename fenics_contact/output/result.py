@@ -316,7 +316,8 @@ None where materials dissipate or are nonlinear |
     | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``geometry``, \
 ``peak_pressure_by_geometry``, ``by_body``; None if unknown |
     | ``contact`` | one entry per pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
-``normal_force``, ``peak_pressure``, where bodies deform much ``peak_nominal_pressure``, ``area``, \
+``normal_force`` (the sum of normal forces), ``normal_resultant`` (the size of their vector sum), \
+``peak_pressure``, where bodies deform much ``peak_nominal_pressure``, ``area``, \
 ``smallest_gap``, ``largest_slip`` in the last load step; without friction closed points count as ``slip`` |
     | ``unheld`` | rigid motions that nothing resists and nothing loads, in words; `State.unheld` |
     | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
@@ -528,7 +529,7 @@ def _read_off(state: State) -> dict[str, Any]:
 def _pair_summary(state: State, number: int) -> dict[str, Any]:
     """Return a summary of the contact of one pair."""
     contact = state.contact
-    mine = contact.on_pair(number)
+    mine, pressing = contact.on_pair(number), contact.normal_forces(number)
     known = {status.name.lower(): int(np.sum(contact.status[mine] == status)) for status in Status}
     largest = float(contact.nominal_pressure[mine].max(initial=0.0))
     nominal = {"peak_nominal_pressure": largest} if state.scene.deforms_much else {}
@@ -536,7 +537,8 @@ def _pair_summary(state: State, number: int) -> dict[str, Any]:
         "points": len(mine),
         **known,
         "force": contact.force[mine].sum(axis=0),
-        "normal_force": float(contact.normal_force[mine].sum()),
+        "normal_force": pressing.sum,
+        "normal_resultant": pressing.resultant,
         "peak_pressure": float(contact.pressure[mine].max(initial=0.0)),
         **nominal,
         "area": contact_area(state, number),

@@ -142,6 +142,7 @@ def _cell(value: Any) -> str:
 def step_row(number: int, name: str, state: State) -> dict[str, Any]:
     """Return what a load step cost and what contact is like at its end."""
     contact, counts = state.contact, state.counts
+    pressing = [contact.normal_forces(number) for number in range(len(state.scene.contacts))]
     drawn = state.preloads() if state.scene.preloads else {}
     return {
         "number": number,
@@ -149,7 +150,8 @@ def step_row(number: int, name: str, state: State) -> dict[str, Any]:
         "iterations": counts["solver_steps"],
         "products": counts["f_products"],
         **{status.name.lower(): contact.count(status) for status in Status},
-        "normal_force": float(contact.normal_force.sum()),
+        "normal_force": sum(each.sum for each in pressing),
+        "normal_resultant": sum(each.resultant for each in pressing),
         "friction_force": _resultant(state),
         "peak_pressure": float(contact.pressure.max(initial=0.0)),
         **{f"preload {name}": each.force for name, each in drawn.items()},
@@ -175,7 +177,9 @@ class StepTable:
     | ``number``, ``name``, ``time`` | of the load step |
     | ``iterations``, ``products`` | of the solver, and with F |
     | ``open``, ``stick``, ``slip`` | contact points by status; closed ones without friction slip |
-    | ``normal_force``, ``friction_force`` | sums over all pairs, [force] |
+    | ``normal_force`` | sum of all normal forces, Σ λ_N, [force] |
+    | ``normal_resultant`` | sizes of the pairs' vector sums Σ n λ_N, added up: as much on flat surfaces |
+    | ``friction_force`` | size of the vector sum of all friction forces, [force] |
     | ``peak_pressure`` | of all pairs, [force / length²] |
     | ``strain_energy``, ``load_energy``, ``friction_energy`` | as in `results.Energies`; empty if not known |
     | ``surface_energy`` | where surfaces give way |

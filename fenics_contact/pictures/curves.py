@@ -25,6 +25,7 @@ from fenics_contact.pictures.canvas import (
     png_path,
     sheet,
 )
+from fenics_contact.results.contact import NormalForces
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
@@ -151,7 +152,7 @@ class ContactTrace:
     points: np.ndarray
     status: np.ndarray
     slip: np.ndarray
-    force: float
+    normal_forces: NormalForces
     shear: float
     rubs: bool
     revolved: bool
@@ -207,7 +208,7 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
     return ContactTrace(
         f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],
         points, contact.status[chosen], slip,
-        float(contact.normal_force[chosen].sum()), float(shear),
+        contact.normal_forces(pair), float(shear),
         state.scene.contacts[pair].has_friction, state.scene.axisymmetric, state.scene.torsion,
     )  # fmt: skip
 

@@ -622,9 +622,8 @@ def _draw_pressure(
 ) -> None:
     peak = float(patch.pressure.max())
     shown = clim or (0.0, peak or 1.0)
-    facts = (
-        f"largest pressure {written(peak)} {units.stress}, normal force {written(patch.force)} {units.force}"
-    )
+    forces = patch.normal_forces.in_words(units.force, written)
+    facts = f"largest pressure {written(peak)} {units.stress}, {forces}"
     wide = patch.frame.proportion > WIDE
     tall = 0.24 + 1.76 / patch.frame.proportion if wide else 0.19 + 0.38 / patch.frame.proportion
     with sheet(paper, (width, round(tall * width)), headline(title, facts)) as figure:

@@ -35,7 +35,7 @@ from fenics_contact.pictures.canvas import (
     written,
 )
 from fenics_contact.pictures.curves import ContactTrace
-from fenics_contact.results.contact import Status
+from fenics_contact.results.contact import NormalForces, Status
 from fenics_contact.results.state import State
 
 #: A surface runs around an axis if Σ A n nᵀ has one eigenvalue below this fraction of the next.
@@ -164,7 +164,7 @@ class ContactPatch:
     points: np.ndarray
     status: np.ndarray
     slip: np.ndarray
-    force: float
+    normal_forces: NormalForces
     rubs: bool
     hidden: int
     frame: Frame
@@ -250,7 +250,7 @@ def _patch(state: State, pair: int, reach: float | None, unrolling: Unrolling | 
         view, unrolling, f"{slave.body}, {slave.name}", places, rows.reshape(-1, facets.shape[1]), pressure,
         points, contact.status[chosen],
         view.project(slip) if unrolling is None else unrolling.turn(slip, mesh.points[node[points]]),
-        force, state.scene.contacts[pair].has_friction, hidden,
+        contact.normal_forces(pair), state.scene.contacts[pair].has_friction, hidden,
         _frame(places[first], pressure[first], contact.points.area[chosen], reach),
     )  # fmt: skip
 
@@ -327,9 +327,9 @@ def draw_traction(
     (clim, reach), rubs = window, trace.rubs
     facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
     unit = f"{units.force} per revolution" if trace.revolved else f"{units.force}/{units.length}"
-    facts += f"normal force {written(trace.force)} {unit}"
+    facts += trace.normal_forces.in_words(unit, written)
     if rubs:
-        shear = trace.shear if abs(trace.shear) > ROUNDING * trace.force else 0.0
+        shear = trace.shear if abs(trace.shear) > ROUNDING * trace.normal_forces.sum else 0.0
         what = "tangential force"
         if trace.twists:
             what, unit = "torque of friction", unit.replace(units.force, f"{units.force} {units.length}", 1)

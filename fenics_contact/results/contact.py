@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -44,6 +45,37 @@ class RowValues:
     opening: np.ndarray
     between_supports: np.ndarray
     residuals: Residuals
+
+
+@dataclass(frozen=True)
+class NormalForces:
+    """The normal forces of a contact pair, added up in both ways.
+
+    Attributes:
+        sum: Σ λ_N, the pressure over the area, ≥ 0, [force].
+        resultant: ‖Σ n λ_N‖, of which nothing is left where they balance each other, as around a shaft; of
+            bodies of revolution along the axis, [force].
+    """
+
+    sum: float
+    resultant: float
+
+    @classmethod
+    def of(cls, force: np.ndarray, normal: np.ndarray, rounding: float = 1e-10) -> NormalForces:
+        """Return those of normal forces, (n,), along normals, (n, dim); `rounding`: of sums that cancel."""
+        total, resultant = float(force.sum()), float(np.linalg.norm(force @ normal))
+        return cls(total, resultant if resultant > rounding * total else 0.0)
+
+    def differ(self, by: float = 1e-4) -> bool:
+        """Return whether the resultant is not the sum, relative to this: the surface is curved."""
+        return self.sum - self.resultant > by * self.sum
+
+    def in_words(self, unit: str = "", written: Callable[[float], str] = "{:.6g}".format) -> str:
+        """Return them with their unit: one number on flat surfaces, where both are the same."""
+        total, resultant = (f"{written(size)} {unit}".rstrip() for size in (self.sum, self.resultant))
+        if not self.differ():
+            return f"normal force {total}"
+        return f"sum of normal forces {total}, their resultant {resultant}"
 
 
 @displayed
@@ -128,6 +160,14 @@ class ContactResult:
         """Force on the slave at each point in space, n λ_N − t τ, shape (n, dim), [force]."""
         normal = self.points.normal
         return self.normal_force[:, None] * normal - self._in_space(self.friction_force)
+
+    def normal_forces(self, pair: int = 0) -> NormalForces:
+        """Return sum and resultant of the normal forces of a pair, by its number in the scene."""
+        mine = self.on_pair(pair)
+        normal = self.points.normal[mine]
+        if self.points.length is not None:  # of revolution: radial ones balance each other
+            normal = normal[:, 1:2]
+        return NormalForces.of(self.normal_force[mine], normal)
 
     @property
     def slip_in_space(self) -> np.ndarray:

@@ -144,7 +144,7 @@ def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress
     for number, pair in enumerate(scene.contacts):
         mine = contact.on_pair(number)
         pressing = contact.normal_force[mine, None] * contact.points.normal[mine]
-        resultant = f"normal force {_size(pressing, force)}"
+        resultant = contact.normal_forces(number).in_words(force)
         if pair.has_friction:
             resultant += f", friction {_size(contact.force[mine] - pressing, force)}"
         pressure = f"{contact.pressure[mine].max(initial=0.0):.5g} {stress}".rstrip()

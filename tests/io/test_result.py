@@ -99,6 +99,7 @@ def test_energies_residuals_and_contact_are_the_states(tmp_path: Path) -> None:
     assert pair["peak_pressure"] == state.contact.pressure.max() > 0.0
     np.testing.assert_allclose(pair["force"], state.contact.force.sum(axis=0))
     assert pair["force"][2] == pytest.approx(pair["normal_force"])
+    assert pair["normal_resultant"] == pytest.approx(pair["normal_force"])
     assert pair["largest_slip"] > 0.0
 
 

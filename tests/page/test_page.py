@@ -133,7 +133,7 @@ def test_files_give_the_page_of_their_state(tmp_path: Path) -> None:
     data, arrays = content(page)
     same, others = content(result_page(state, title="Blocks <of> steel", units=Units(stress="psi")).html)
     assert data["title"] == "Blocks <of> steel"
-    assert "Load steps step stick normal force (N) 0 pressed 11 1234.6" in text_of(page)
+    assert "Load steps step stick sum of normal forces (N) 0 pressed 11 1234.6" in text_of(page)
     assert "<title>Blocks &lt;of&gt; steel</title>" in page
     assert "<of>" not in page.replace("\\u003c", "")
     for ours, theirs in zip(data["steps"][0]["bodies"], same["steps"][0]["bodies"], strict=True):
@@ -164,7 +164,7 @@ def test_tables_tell_the_numbers_of_the_result() -> None:
     contact = state.contact
     for status in Status:
         assert f"{contact.count(status)} {status.name.lower()}" in told
-    assert f"normal force {contact.normal_force.sum():.5g} N" in told
+    assert f"sum of normal forces {contact.normal_force.sum():.5g} N" in told
     held = state.reactions()[0]
     numbers = [f"{part:.5g}".replace("-", "−") for part in held.force]
     assert f"reaction 0 lower z0 force (N) {' '.join(numbers)}" in told
@@ -201,7 +201,7 @@ def test_moments_in_the_plane_are_one_number_and_rounding_is_zero() -> None:
     assert f"force (N/mm) {force} about" in told
     assert f"moment (N mm/mm) {moment}" in told
     assert f"energy, strain {state.energies.strain:.5g} N mm/mm" in told
-    assert f"normal force {state.contact.normal_force.sum():.5g} N/mm" in told
+    assert f"sum of normal forces {state.contact.normal_force.sum():.5g} N/mm" in told
     forces = told.partition("Forces and moments")[2].partition("Imbalance")[0]
     assert "e−1" not in forces, "rounding is told"
 

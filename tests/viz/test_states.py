@@ -193,7 +193,7 @@ def test_patch_holds_the_points_of_the_pair_where_they_are() -> None:
     np.testing.assert_array_equal(patch.status, contact.status)
     places = contact_places(state, drawn_bodies(state))
     np.testing.assert_allclose(patch.places[patch.points], patch.view.project(places))
-    assert patch.force == pytest.approx(contact.normal_force.sum())
+    assert patch.normal_forces.sum == pytest.approx(contact.normal_force.sum())
     slips = contact.status == Status.SLIP
     expected = np.linalg.norm(contact.slip[slips], axis=1)
     np.testing.assert_allclose(np.linalg.norm(patch.slip[slips], axis=1), expected, rtol=0.01)
