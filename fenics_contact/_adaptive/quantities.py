@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact._adaptive.resultants import PairForce, StickArea, SupportForce, TouchingArea
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._scene.pairs import pair_number
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.near import MovementNear, StressNear
@@ -136,6 +137,7 @@ QUANTITIES: dict[str, tuple[tuple[str, ...], Callable[[_Where], Objective]]] = {
 }
 
 
+@naming_arguments
 def quantity(
     name: str,
     scene: Scene,

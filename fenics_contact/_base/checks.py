@@ -8,15 +8,19 @@ import re
 import reprlib
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
-from functools import cache
+from functools import cache, wraps
+from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from types import ModuleType, NoneType, UnionType
-from typing import Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, ParamSpec, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact._base.late_names import homes
+from fenics_contact.errors import FenicsContactError, InvalidInputError
 from fenics_contact.errors.kinds import scene_file_code
 
 #: Largest number of cells in a row, and of any other count: more is a typing error.
@@ -220,6 +224,92 @@ def _named(hint: Any) -> str:
         return f"a {name}"
     needed = [field.name for field in fields(kind) if field.default is field.default_factory is MISSING]
     return f"{name}({', '.join(needed)})"
+
+
+Given = ParamSpec("Given")
+Found = TypeVar("Found")
+
+
+def naming_arguments(function: Callable[Given, Found]) -> Callable[Given, Found]:
+    """Let a function that fails because an argument is of another kind than declared name the argument.
+
+    The call itself is as it was: only an error that is none of this package's is looked into.
+
+    Example:
+        >>> @naming_arguments
+        ... def size_of(path: str | Path) -> int:
+        ...     '''Return a size.
+        ...
+        ...     Args:
+        ...         path: File.
+        ...     '''
+        ...     return len(path.strip())
+        >>> size_of(3)
+        Traceback (most recent call last):
+        fenics_contact.errors.InvalidInputError: size_of: path must be a string or a Path, got an int: file
+    """
+
+    @wraps(function)
+    def called(*arguments: Given.args, **named: Given.kwargs) -> Found:
+        try:
+            return function(*arguments, **named)
+        except FenicsContactError:
+            raise
+        except (AttributeError, TypeError, ValueError, LookupError) as error:
+            words = _unfit_argument(function, arguments, named)
+            if words is None:
+                raise
+            raise InvalidInputError(words) from error
+
+    return called
+
+
+def _unfit_argument(function: Any, arguments: tuple[Any, ...], named: dict[str, Any]) -> str | None:
+    """Return words on the first argument that does not fit its declaration, None if all do."""
+    try:
+        given = signature(function).bind(*arguments, **named).arguments
+    except TypeError:
+        return None  # Python names arguments that are missing or too many
+    hints = _argument_hints(inspect.unwrap(function))
+    for name, value in given.items():
+        wrong = None
+        with suppress(TypeError):  # a declaration that no value can be compared with
+            wrong = _misfit(value, hints.get(name, Any), name)
+        if wrong is not None:
+            place, hint, found = wrong
+            words = f"{function.__name__}: {place} must be {_kinds(hint)}, got {kind_in_words(type(found))}"
+            explanation = meaning(function, name)
+            return f"{words}: {explanation}" if explanation else words
+    return None
+
+
+@cache
+def _argument_hints(function: Any) -> dict[str, Any]:
+    """Return the declared types of arguments, those too that are imported for type checkers alone."""
+    known: dict[str, Any] = {name: module for name, module in sys.modules.items() if "." not in name}
+    of_package = function.__module__.startswith("fenics_contact.")
+    for name, home in homes(function.__module__).items() if of_package else ():
+        with suppress(ImportError, AttributeError):
+            known[name] = getattr(import_module(home), name)
+    try:
+        return get_type_hints(function, localns=known)
+    except (AttributeError, NameError, TypeError):  # of a library that is not loaded
+        return {}
+
+
+def _kinds(hint: Any) -> str:
+    """Describe the kinds of values that fit a type."""
+    if get_origin(hint) in (Union, UnionType):
+        *first, last = [_kinds(part) for part in get_args(hint)]
+        return f"{', '.join(first)} or {last}" if first else last
+    return kind_in_words(hint) if isinstance(hint, type) and hint not in _PLAIN else _named(hint)
+
+
+def kind_in_words(kind: type) -> str:
+    """Return the name of a class with its article."""
+    if kind is NoneType:
+        return "None"
+    return f"{'an' if kind.__name__[0] in 'AEIOUaeio' else 'a'} {kind.__name__}"
 
 
 def meaning(owner: Any, name: str) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 
 from fenics_contact import _dolfinx
+from fenics_contact._base.checks import kind_in_words
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
@@ -305,6 +306,7 @@ class ContactProblem:
         memory: float | None = None,
     ) -> None:
         """Prepare; nothing is computed yet. Arguments as for `solve_scene`."""
+        _require_scene(scene)
         self.scene, self.comm = scene, comm
         self.solver, self.tolerance, self.steps = solver, tolerance, steps
         self.timer = PhaseTimer()
@@ -565,6 +567,15 @@ class ContactProblem:
         if start is None or self.state is None:
             return start
         return self.state if scene.has_meshes_of(self.state.scene) else start
+
+
+def _require_scene(scene: object) -> None:
+    """Reject what is solved by another call, or has a scene."""
+    if not isinstance(scene, Scene):
+        raise InvalidInputError(
+            f"what is solved must be a Scene, got {kind_in_words(type(scene))}: load steps are solved by "
+            "solve_steps(scene, steps, comm), a ContactProblem by its solve(), a scene file's scene is .scene"
+        )
 
 
 @collectively("solve_scene", lambda scene, comm, **_: comm)

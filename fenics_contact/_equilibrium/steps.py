@@ -16,7 +16,7 @@ from fenics_contact._base.checkpoint import (
     safe_point,
     without_checkpoint,
 )
-from fenics_contact._base.checks import brief
+from fenics_contact._base.checks import brief, kind_in_words, naming_arguments
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.files import CheckpointError
 from fenics_contact._base.fingerprint import described, differences, require_alike
@@ -31,6 +31,8 @@ from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
+    from mpi4py import MPI
+
     from fenics_contact.results.deformed_state import AnyState, DeformedState
 
 KIND = "load history"
@@ -275,26 +277,52 @@ class LoadSequence:
             self._task.end()
 
 
+@naming_arguments
 def solve_steps(
-    problem: ContactProblem, steps: Sequence[LoadStep], *, checkpoint: Checkpoint | None = None
+    problem: ContactProblem | Scene,
+    steps: Sequence[LoadStep],
+    comm: MPI.Comm | None = None,
+    *,
+    checkpoint: Checkpoint | None = None,
 ) -> tuple[AnyState, ...]:
     """Compute the states at the end of every load step, see `LoadSequence`. Collective.
 
     Args:
-        problem: Bodies, contact pairs, and the supports and loads that the steps do not give.
+        problem: Bodies, contact pairs, and the supports and loads that the steps do not give, as a scene; or
+            as a `ContactProblem`, which has further options.
         steps: The steps in their order.
+        comm: Communicator over which the subdomains of a scene are spread; a problem has its own.
         checkpoint: As for `LoadSequence`.
 
     Example:
         >>> push = [LoadStep(f"push {s}", loads=[weight, pull(s)]) for s in (0.5, 1.0, 0.0)]  # doctest: +SKIP
-        >>> states = solve_steps(ContactProblem(scene, comm), push)  # doctest: +SKIP
+        >>> states = solve_steps(scene, push, comm)  # doctest: +SKIP
+        >>> states = solve_steps(ContactProblem(scene, comm, tolerance=1e-8), push)  # doctest: +SKIP
     """
+    problem = _problem_of(problem, comm)
     with together(problem.comm):
         require_steps(steps)
     sequence = LoadSequence(problem, checkpoint=checkpoint, count=len(steps))
     states = tuple(sequence.advance(step) for step in steps)
     sequence.finish()
     return states
+
+
+def _problem_of(given: ContactProblem | Scene, comm: MPI.Comm | None) -> ContactProblem:
+    """Return the problem of load steps, of a scene on a communicator."""
+    if not isinstance(given, Scene):
+        if comm not in (None, given.comm):
+            raise InvalidInputError(
+                "solve_steps of a ContactProblem is on the problem's own communicator, got another one: "
+                "leave it out, or give the scene"
+            )
+        return given
+    if comm is None or not hasattr(comm, "allreduce"):
+        raise InvalidInputError(
+            f"solve_steps of a scene needs a communicator, got {kind_in_words(type(comm))}: "
+            "solve_steps(scene, steps, MPI.COMM_WORLD)"
+        )
+    return ContactProblem(given, comm)
 
 
 def require_steps(steps: object) -> None:

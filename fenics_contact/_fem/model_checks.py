@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.composition import Composition
 from fenics_contact._fem.templates import Templates
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 _TURN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 
 
+@naming_arguments
 def check_history_material(
     material: HistoryMaterial, size: float = 1e-3, duration: float = 1.0, tolerance: float = 1e-5
 ) -> None:
@@ -295,6 +297,7 @@ def stiffness_of_cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple
     return K, points
 
 
+@naming_arguments
 def check_hyperelastic(
     material: Hyperelasticity,
     cell_type: str | None = None,

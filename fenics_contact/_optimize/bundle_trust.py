@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact._base.checkpoint import Checkpoint
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._optimize.bundle import Bundle, SubproblemError
 from fenics_contact._optimize.constraints import Box, Constraints
 from fenics_contact._optimize.merit import (
@@ -546,6 +547,7 @@ class _Run:
         )
 
 
+@naming_arguments
 def minimize(
     fun: Fun,
     x0: ArrayLike,

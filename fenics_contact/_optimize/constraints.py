@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import displayed
 from fenics_contact._optimize.bundle import shortest, unit_rows
 from fenics_contact._optimize.nonlinear import NonlinearConstraint, is_nonlinear
@@ -351,6 +352,7 @@ def _rows(n: int, matrix: ArrayLike, limit: ArrayLike, name: str, right: str) ->
     return a, b
 
 
+@naming_arguments
 def nearest_feasible(
     x: ArrayLike,
     bounds: Box | None = None,

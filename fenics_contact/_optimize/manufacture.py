@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._optimize.constraints import LinearConstraints
 from fenics_contact.errors import InvalidInputError
 
@@ -26,6 +27,7 @@ class Net(Protocol):
         """Nodes, parameters, directions and counts of the surface, see `gallery.DesignSurface`."""
 
 
+@naming_arguments
 def symmetric(design: Net, axis: int) -> LinearConstraints:
     """Keep the displacement equal to its mirror image along a parameter.
 
@@ -42,6 +44,7 @@ def symmetric(design: Net, axis: int) -> LinearConstraints:
     return _equal(net.size, net[:half].ravel(), net[::-1][:half].ravel())
 
 
+@naming_arguments
 def monotone(design: Net, axis: int, sign: int = 1) -> LinearConstraints:
     """Let the displacement never fall along a parameter; rise with sign -1.
 
@@ -61,6 +64,7 @@ def monotone(design: Net, axis: int, sign: int = 1) -> LinearConstraints:
     return LinearConstraints(rows, np.zeros(len(rows)))
 
 
+@naming_arguments
 def convex(design: Net, axis: int, points: Array | None = None) -> LinearConstraints:
     """Keep profiles along a parameter from turning hollow: they bulge out of the body, or are straight.
 
@@ -79,6 +83,7 @@ def convex(design: Net, axis: int, points: Array | None = None) -> LinearConstra
     return LinearConstraints(rows, curvature)
 
 
+@naming_arguments
 def smallest_radius(design: Net, axis: int, radius: float, points: Array) -> LinearConstraints:
     """Limit the curvature of profiles along a parameter, hollow or bulging, to that of a radius.
 
@@ -110,6 +115,7 @@ def smallest_radius(design: Net, axis: int, radius: float, points: Array) -> Lin
     return LinearConstraints(np.vstack([rows, -rows]), limit)
 
 
+@naming_arguments
 def fixed_rim(design: Net, width: int | Sequence[int] = 1) -> LinearConstraints:
     """Hold the control points at the rim of the net, so that the surface keeps its edges.
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.colors import Colormap, to_hex
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import force_units, name_in_words
 from fenics_contact._base.requirements import require_extra
 from fenics_contact._page.obstacles import obstacle_entries
@@ -525,6 +526,7 @@ class Page:
         return {"text/html": _FRAME.format(page=escape(self.html)), "text/plain": str(self)}
 
 
+@naming_arguments
 def result_page(
     result: State | Mapping[str, State] | str | Path,
     path: str | Path | None = None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from inspect import signature
 from typing import Literal
 
 import numpy as np
@@ -71,13 +72,14 @@ class Body:
             _check_half_section(self.mesh)
         if isinstance(self.material, Mapping):
             _check_regions(self.mesh, self.material)
+        for material in self.materials:
+            _check_material(material, self.mesh.dim, self.axisymmetric)
         if self.has_thickness and any(thickness_of(each) is None for each in self.materials):
             raise InvalidInputError(
                 "all materials of a body must have a thickness or none, got "
                 f"{[thickness_of(each) for each in self.materials]}: give it to the others, too"
             )
         for material in self.materials:
-            _check_material(material, self.mesh.dim, self.axisymmetric)
             if self.axisymmetric and not self.torsion:
                 _check_symmetric_axes(material)
             _check_mean_dilatation(material, self.mesh)
@@ -219,7 +221,17 @@ def _check_half_section(mesh: BodyMesh) -> None:
         )
 
 
+def _needed(material: type) -> list[str]:
+    """Return the names of what the class of a material must be given."""
+    return [each.name for each in signature(material).parameters.values() if each.default is each.empty]
+
+
 def _check_material(material: Material, dim: int, axisymmetric: bool) -> None:
+    if isinstance(material, type):
+        raise InvalidInputError(
+            f"a material must have its constants, got the class {material.__name__}: write "
+            f"{material.__name__}({', '.join(_needed(material))})"
+        )
     name = type(material).__name__
     needed = ("dims", "parameters", "stress", "stiffness", "kernel")
     with user_code(f"reading {', '.join(needed)} of material {name}"):

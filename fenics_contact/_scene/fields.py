@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from ufl.core.expr import Expr
 
-from fenics_contact._base.checks import checked, require_file
+from fenics_contact._base.checks import checked, naming_arguments, require_file
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
@@ -276,6 +276,7 @@ TABLES = (".csv", ".txt", ".dat", ".tsv")
 AXES = ("x", "y", "z")
 
 
+@naming_arguments
 def read_field(
     path: str | Path,
     field: str | Sequence[str] | None = None,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact._base.checks import GivenVector, check_row, checked, floats, unit_vector
+from fenics_contact._base.checks import GivenVector, check_row, checked, floats, naming_arguments, unit_vector
 from fenics_contact._scene.fields import (
     ScalarValue,
     Ufl,
@@ -359,6 +359,7 @@ class Spinning:
         return np.pad(self.density * self.speed**2 * arms, ((0, 0), (0, more)))
 
 
+@naming_arguments
 def centrifugal(
     body: str,
     density: float,

@@ -187,6 +187,11 @@ class ContactPair:
 
     def __post_init__(self) -> None:
         """Reject gaps that contradict each other or are no lengths."""
+        if isinstance(self.master, type):
+            raise InvalidInputError(
+                f"ContactPair.master must be a Surface or an obstacle, got the class {self.master.__name__}: "
+                "write it with where it lies, such as RigidPlane((0, 0, 0), (0, 0, 1))"
+            )
         if self.gap is not None and self.interference is not None:
             raise InvalidInputError(
                 f"a contact pair has a gap or an interference, got gap={self.gap!r} and interference="

@@ -17,7 +17,7 @@ from fenics_contact._adaptive.minimised import AccurateDesign, minimize_to
 from fenics_contact._adaptive.nested import check_nested, solve_nested
 from fenics_contact._adaptive.quantities import quantity
 from fenics_contact._base.checkpoint import Checkpoint
-from fenics_contact._base.checks import require_file
+from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import LoadSequence
 from fenics_contact._optimize.bundle_trust import BundleTrust, minimize
@@ -598,6 +598,7 @@ class SceneFile:
         return located(self.source, keys)
 
 
+@naming_arguments
 def read_scene_file(
     scene: str | Path | Mapping[str, Any],
     comm: MPI.Comm,

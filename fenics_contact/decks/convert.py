@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._scene.constraints import LinearConstraint
 from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.loads import (
@@ -62,6 +63,7 @@ _LAWS: dict[type, str] = {LinearClosure: "linear", ExponentialClosure: "exponent
 FREE = "free"
 
 
+@naming_arguments
 def write_scene_file(deck: Deck, path: str | Path) -> list[Path]:
     """Write a deck as a scene file, its mesh as a deck of nodes, elements, sets and surfaces alone.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenics_contact._base.checks import require_file
+from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact._base.display import displayed
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import LoadSequence
@@ -146,6 +146,7 @@ class Deck:
         return tables_of(self, state, step)
 
 
+@naming_arguments
 def read_deck(path: str | Path, comm: MPI.Comm | None = None, *, statics_only: bool = False) -> Deck:
     """Read a deck of CalculiX or Abaqus: its mesh, materials, supports, contact, loads and steps.
 

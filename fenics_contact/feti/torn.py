@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import displayed
 from fenics_contact._fem.loads import as_tractions
 from fenics_contact._pairing.points import (
@@ -462,6 +463,7 @@ class TornSystem:
         return replace(self, fluid=FluidLoad(-self.force(force), wet, pressure), free=free)
 
 
+@naming_arguments
 def build_torn_system(
     scene: Scene,
     decomposition: Decomposition,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact._base.checks import check_count
+from fenics_contact._base.checks import check_count, naming_arguments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import closed, pieces
@@ -39,6 +39,7 @@ ALIKE = 1e-6
 """Cuts that differ by less are equivalent: rounding does not choose between them."""
 
 
+@naming_arguments
 def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
     """Cut any mesh in two, and the halves again, each time by the cut of least area.
 

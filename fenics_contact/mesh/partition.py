@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from fenics_contact._base.checks import check_count
+from fenics_contact._base.checks import check_count, naming_arguments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import closed
@@ -24,6 +24,7 @@ from fenics_contact.mesh.faces import neighbours, shared_faces, vector_areas
 from fenics_contact.mesh.quality import cell_volumes
 
 
+@naming_arguments
 def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
     """Cut a structured mesh into boxes of cells.
 

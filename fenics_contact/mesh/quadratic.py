@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
 from fenics_contact.mesh.cell_types import (
@@ -24,6 +25,7 @@ from fenics_contact.mesh.on_shapes import put_on_shapes, with_parts
 _QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, TETRAHEDRON10, HEXAHEDRON27)}
 
 
+@naming_arguments
 def quadratic(mesh: BodyMesh) -> BodyMesh:
     """Return the mesh with quadratic cells.
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from fenics_contact import _dolfinx
-from fenics_contact._base.checks import brief
+from fenics_contact._base.checks import brief, naming_arguments
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
@@ -72,6 +72,7 @@ def one_by_one(refinements: Sequence[Refinement]) -> tuple[Refinement, ...]:
     return tuple(one for each in refinements for one in each.parts or (each,))
 
 
+@naming_arguments
 def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     """Halve some cells, and as many others as the mesh needs.
 

@@ -6,6 +6,7 @@ from copy import copy
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
 from fenics_contact.mesh.cell_types import cell_type_of
@@ -42,6 +43,7 @@ def centres_of(cells: np.ndarray, dim: int) -> Centres | None:
     return Centres(node, np.concatenate(masters)[first], np.concatenate(weights)[first])
 
 
+@naming_arguments
 def serendipity(mesh: BodyMesh) -> BodyMesh:
     """Return the mesh with serendipity cells: the centres of faces and cells follow their other nodes.
 

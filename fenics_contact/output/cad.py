@@ -17,6 +17,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, collectively, together
 from fenics_contact.gallery.links import DesignSurface
@@ -362,6 +363,7 @@ class StepFile:
 
 
 @collectively("write_step", lambda problem, *_, **__: problem.comm)
+@naming_arguments
 def write_step(
     problem: ShapeProblem | JointProblem,
     alpha: np.ndarray,

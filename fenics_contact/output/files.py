@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import in_short
 from fenics_contact._base.files import hidden_folder, locked, replace_all
 from fenics_contact.errors import FenicsContactError, InvalidInputError, agree, together
@@ -55,6 +56,7 @@ def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
         raise _output_error(targets, error) from error
 
 
+@naming_arguments
 def write_text(path: Path, text: str) -> None:
     """Write a text file atomically; raises as `replacing` does."""
     with replacing(path) as (temporary,):
@@ -131,6 +133,7 @@ def _output_error(targets: Sequence[Path], error: Exception) -> OutputError:
 SHOWN = 12
 
 
+@naming_arguments
 def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> Path:
     """Write data to a JSON file, indented, with the keys in the order given.
 

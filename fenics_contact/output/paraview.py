@@ -16,6 +16,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from fenics_contact import _dolfinx
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.files import remove_abandoned
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.requirements import require_extra
@@ -195,6 +196,7 @@ _MESHIO_SHAPES = {
 
 
 @collectively("write_vtu", lambda state, *_, **__: state.torn.decomposition.comm)
+@naming_arguments
 def write_vtu(
     state: State,
     folder: str | Path,
@@ -286,6 +288,7 @@ def _multi_block(bodies: list[str], files: list[Path]) -> str:
 
 
 @collectively("write_xdmf", lambda state, *_, **__: state.torn.decomposition.comm)
+@naming_arguments
 def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
     """Write displacement and von Mises stress of every body to XDMF, all ranks together. Collective.
 

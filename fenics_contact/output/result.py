@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fenics_contact import _dolfinx
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.libraries import MPI, PETSc
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.constraints import LinearConstraint
@@ -284,6 +285,7 @@ UNITS = (
 
 
 @collectively("write_result", lambda state, *_, **__: state.torn.decomposition.comm)
+@naming_arguments
 def write_result(
     state: State,
     folder: str | Path,
@@ -379,6 +381,7 @@ def result_record(
 
 
 @collectively("write_optimisation_result", lambda result, problem, *_, **__: problem.comm)
+@naming_arguments
 def write_optimisation_result(
     result: Result,
     problem: ShapeProblem | JointProblem,
@@ -588,6 +591,7 @@ def _history(result: Result) -> dict[str, list[Any]]:
     return {name: [readable(getattr(record, name)) for record in result.history] for name in names}
 
 
+@naming_arguments
 def read_result(path: str | Path) -> dict[str, Any]:
     """Read a file of `write_result` or `write_optimisation_result`.
 

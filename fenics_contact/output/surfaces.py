@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact.design.design import MovedSurface
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.mesh.cell_types import FACET_TYPES
@@ -59,6 +60,7 @@ def moved_body(
 
 
 @collectively("write_design_table", lambda problem, *_, **__: problem.comm)
+@naming_arguments
 def write_design_table(
     problem: ShapeProblem | JointProblem,
     alpha: np.ndarray,
@@ -132,6 +134,7 @@ def _table(surface: MovedSurface, places: np.ndarray, length: str) -> str:
 
 
 @collectively("write_stl", lambda problem, *_, **__: problem.comm)
+@naming_arguments
 def write_stl(
     problem: ShapeProblem | JointProblem, alpha: np.ndarray, path: str | Path, *, body: str | None = None
 ) -> Path:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.pairs import pair_number
 from fenics_contact.errors import collectively, together
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 
 @collectively("write_contact_table", lambda state, *_, **__: state.torn.decomposition.comm)
+@naming_arguments
 def write_contact_table(state: State, path: str | Path, *, pair: int | str | None = None) -> Path:
     """Write what happens at every contact point as a table (CSV). Collective.
 

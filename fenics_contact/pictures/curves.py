@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.pictures.canvas import (
     BLUE,
@@ -48,6 +49,7 @@ LOOKS = (
 MOST_SYMBOLS = 90
 
 
+@naming_arguments
 def plot_curves(
     series: Mapping[str, Curve],
     path: str | Path | None = None,

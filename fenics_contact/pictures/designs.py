@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.spatial import cKDTree
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._optimize.result import Record
 from fenics_contact.design.memory import DesignPoint
 from fenics_contact.errors import InvalidInputError
@@ -77,6 +78,7 @@ VISIBLE = 0.06
 BORDER = 0.08
 
 
+@naming_arguments
 def plot_before_after(
     first: State | DesignPoint,
     best: State | DesignPoint,
@@ -291,6 +293,7 @@ PART = 0.45
 _Pair = tuple[np.ndarray, np.ndarray]
 
 
+@naming_arguments
 def plot_control_net(
     problem: ShapeProblem | JointProblem,
     alpha: np.ndarray,
@@ -422,6 +425,7 @@ def _net_layers(grid: np.ndarray, net: np.ndarray, colour: str, thickness: float
     return [Layer(mesh, look) for mesh in (*tubes, points)]
 
 
+@naming_arguments
 def plot_convergence(
     history: Sequence[Record],
     path: str | Path | None = None,

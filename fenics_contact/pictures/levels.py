@@ -12,6 +12,7 @@ import pyvista as pv
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.pictures.canvas import (
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from fenics_contact._adaptive.levels import Level
 
 
+@naming_arguments
 def plot_levels(
     series: Mapping[str, Sequence[Level]],
     path: str | Path | None = None,
@@ -112,6 +114,7 @@ def _positive(errors: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(errors) & (errors > 0.0), errors, np.nan)
 
 
+@naming_arguments
 def plot_meshes(
     scenes: Mapping[str, Scene],
     path: str | Path | None = None,

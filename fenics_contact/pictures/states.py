@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LogNorm, Normalize
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import counted
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
@@ -88,6 +89,7 @@ def axes_of(scene: Scene) -> tuple[str, str]:
     return ("r", "z") if scene.axisymmetric else ("x", "y")
 
 
+@naming_arguments
 def plot_decomposition(
     scene: Scene,
     partitions: Mapping[str, np.ndarray],
@@ -154,6 +156,7 @@ VISIBLE = 0.03
 QUANTILE = 0.995
 
 
+@naming_arguments
 def plot_stress(
     state: State,
     path: str | Path | None = None,
@@ -223,6 +226,7 @@ def plot_stress(
     )
 
 
+@naming_arguments
 def plot_field(
     result: State | Bodies,
     field: str | Mapping[str, np.ndarray] = "von_mises",
@@ -280,9 +284,7 @@ def plot_field(
         values, entry = _named_field(drawn, field, named)
     else:
         meshes = state.scene.bodies if state else {}
-        cells = {
-            k: meshes[k].mesh.cells_cut if state else cells_cut(k, body) for k, body in chosen.items()
-        }
+        cells = {k: meshes[k].mesh.cells_cut if state else cells_cut(k, body) for k, body in chosen.items()}
         values, entry = _own_field(drawn, cells, field, label)
     if revolved and ", " in entry["label"]:  # x, y, z in space are others than r, z and the way around
         entry = {**entry, "label": f"{entry['label']} of the section"}
@@ -391,6 +393,7 @@ def chosen_scale(bodies: Bodies) -> float:
 SPAN = 1e-4
 
 
+@naming_arguments
 def plot_error(
     state: State,
     path: str | Path | None = None,
@@ -464,6 +467,7 @@ ARROW = 0.07
 COLUMNS = 3
 
 
+@naming_arguments
 def plot_contact_status(
     states: State | Mapping[str, State],
     path: str | Path | None = None,
@@ -570,6 +574,7 @@ def draw_status(axes: Axes, patch: ContactPatch, *, counted: bool = True) -> np.
 WIDE = 2.5
 
 
+@naming_arguments
 def plot_contact_pressure(
     state: State,
     path: str | Path | None = None,

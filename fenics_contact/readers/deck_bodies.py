@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from fenics_contact._base.checks import require_file
+from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.quadratic_nodes import with_centres
@@ -332,6 +332,7 @@ def integration_of(
     return "reduced" if found.pop() else "full"
 
 
+@naming_arguments
 def read_deck_mesh(path: str | Path, comm: MPI.Comm | None = None) -> dict[str, BodyMesh]:
     """Read the mesh of a deck of CalculiX or Abaqus: its bodies, with regions, surfaces and node sets.
 

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from fenics_contact._base.checks import require_file
+from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import start
 from fenics_contact.errors import InvalidInputError, together
@@ -298,6 +298,7 @@ Surfaces = Sequence[Label] | Mapping[str, Label | Sequence[Label]]
 """Tags; or surface to tag or tags."""
 
 
+@naming_arguments
 def read_xdmf(
     path: str | Path,
     bodies: Bodies | None = None,
@@ -349,6 +350,7 @@ def read_xdmf(
     return bodies_of(made_once(comm, lambda: _read(Path(path), facets, names)), bodies, surfaces)
 
 
+@naming_arguments
 def from_dolfinx(
     mesh: dolfinx.mesh.Mesh,
     cell_tags: dolfinx.mesh.MeshTags | None = None,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fenics_contact._base.checks import require_file
+from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact.errors import FenicsContactError, InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -34,6 +34,7 @@ Surfaces = Sequence[str] | Mapping[str, str | Sequence[str]]
 """Names of groups; or surface to group or groups."""
 
 
+@naming_arguments
 def read_msh(
     path: str | Path,
     bodies: Bodies | None = None,
@@ -131,6 +132,7 @@ def _read(path: Path) -> TaggedMesh:
         return tagged_mesh_of(gmsh, f"file '{path}'")
 
 
+@naming_arguments
 def refilled(mesh: BodyMesh) -> BodyMesh:
     """Return new tetrahedra behind the boundary of a body, which keeps its nodes, facets and named surfaces.
 

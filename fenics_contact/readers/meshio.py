@@ -21,7 +21,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from fenics_contact._base.checks import require_file
+from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -386,6 +386,7 @@ def _check_all_labelled(groups: Groups, cells: Mapping[str, np.ndarray], word: s
             )
 
 
+@naming_arguments
 def read_mesh(
     path: str | Path,
     bodies: Bodies | None = None,
@@ -445,6 +446,7 @@ def read_mesh(
     return bodies_of(made_once(comm, lambda: _read(path, how, file_format)), bodies, surfaces)
 
 
+@naming_arguments
 def from_meshio(
     mesh: meshio.Mesh,
     bodies: Bodies | None = None,

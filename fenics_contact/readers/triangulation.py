@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.readers.meshio import read_with_meshio
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 
+@naming_arguments
 def read_triangulation(
     path: str | Path,
     *,

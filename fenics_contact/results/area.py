@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fenics_contact._base.checks import GivenVector, unit_vector
+from fenics_contact._base.checks import GivenVector, naming_arguments, unit_vector
 from fenics_contact._scene.pair_geometry import modulus_of
 from fenics_contact._scene.pairs import Surface, pair_number
 from fenics_contact._scene.parts import surface_of
@@ -18,6 +18,7 @@ from fenics_contact.results.contact import Status
 from fenics_contact.results.state import State
 
 
+@naming_arguments
 def contact_area(state: State, pair: int | str = 0) -> float:
     """Return the area in which the surfaces of a pair touch, in the plane the length, [length²] or [length].
 
@@ -80,6 +81,7 @@ def _area(state: State, surface: _SlaveSurface) -> float:
     return total
 
 
+@naming_arguments
 def contact_width(state: State, direction: GivenVector, pair: int | str = 0) -> float:
     """Return how far the area in which the surfaces of a pair touch reaches along a direction, [length].
 

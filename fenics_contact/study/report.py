@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import counted
 from fenics_contact.output.files import write_text
 from fenics_contact.study.results import (
@@ -52,6 +53,7 @@ def settings(run: Run) -> tuple[str, ...]:
     )  # fmt: skip
 
 
+@naming_arguments
 def accuracy_table(errors: Errors, targets: Sequence[float] = TARGETS) -> str:
     """Tabulate for every quantity and accuracy the fastest run that reaches it, see `reliable`.
 
@@ -116,6 +118,7 @@ def _cheapest(
     return min(alike, key=lambda pair: (len(pair[0].parameters.differences(base)), pair[1]))
 
 
+@naming_arguments
 def cost_table(errors: Errors) -> str:
     """Tabulate cost and effect of other values of settings than the base's, on the finest common mesh.
 
@@ -175,6 +178,7 @@ def _change(value: object, before: object) -> str:
 PICTURES = ("accuracy", "convergence", "parts", "phases")
 
 
+@naming_arguments
 def write_report(folder: str | Path, results: Results, *, figures: bool = True) -> str:
     """Write ``study.json``, ``table.md`` and the figures of a study, also of an incomplete one.
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.output.files import write_json
 from fenics_contact.study.study import Parameters, QuantityFacts, SceneFacts
@@ -104,6 +105,7 @@ def write_results(path: Path, results: Results, findings: Mapping[str, Any]) -> 
     )
 
 
+@naming_arguments
 def read_study(folder: str | Path) -> Results:
     """Read the results of a study.
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, TextIO
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.launching import FinishedProcess, finished, last_words, launcher, sharing_launcher
 from fenics_contact._base.progress import Task, duration, show_progress
 from fenics_contact.output.files import write_json
@@ -278,6 +279,7 @@ class Settings:
     verify: bool = True
 
 
+@naming_arguments
 def run_study(
     scene: str,
     runs: str | Path,
