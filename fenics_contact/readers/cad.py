@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from fenics_contact._base.checks import check_numbers, checked, require_file, unit_vector
+from fenics_contact._base.checks import (
+    check_numbers,
+    checked,
+    floats,
+    naming_arguments,
+    require_file,
+    unit_vector,
+)
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
@@ -266,6 +273,7 @@ def _listed(faces: Sequence[CadFace], most: int = 60) -> str:
 SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".geo", ".geo_unrolled")
 
 
+@naming_arguments
 def read_cad(
     path: str | Path,
     size: float | None = None,
@@ -352,15 +360,61 @@ def _read(
         with _reasons(path):
             gmsh.merge(str(path))
         dim = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
-        for each in (dim, dim - 1):
-            _name(gmsh, each, unique=each == dim)
+        _name(gmsh, dim, unique=True)
+        _name(gmsh, dim - 1, unique=False, without=_inner_faces(gmsh, dim, bodies))
         if surfaces is not None and dim > 1:
             _choose(gmsh, dim - 1, surfaces, f"file '{path}'")
         if sizes:
             _set_sizes(gmsh, dim, size, sizes, bodies, f"file '{path}'")
+        _require_joined(gmsh, dim, bodies, path)
         with _reasons(path):
             gmsh.model.mesh.generate(dim)
         return from_gmsh_model(bodies)
+
+
+def _require_joined(gmsh: ModuleType, dim: int, bodies: Bodies | None, path: Path) -> None:
+    """Reject a body of several solids that meet in a face that each of them has for itself."""
+    for name, solids in _solids_of(gmsh, dim, bodies).items():
+        found: dict[tuple[float, ...], tuple[int, str]] = {}
+        for tag, label in solids.items():
+            for _, face in gmsh.model.getBoundary([(dim, tag)], oriented=False):
+                box = np.array(gmsh.model.getBoundingBox(dim - 1, face))
+                other, first = found.setdefault(floats(np.round(box / np.ptp(box), 4) + 0.0), (face, label))
+                if other != face and first != label:
+                    raise InvalidInputError(
+                        f"solids of a body must hang together, but {first!r} and {label!r} of body {name!r} "
+                        f"meet in a face that file '{path}' has twice, as {other} and {face}: join them by a "
+                        f'file join.geo with SetFactory("OpenCASCADE"); v() = ShapeFromFile("{path.name}"); '
+                        "Coherence; and read that, or let each be a body and give the scene a Tie between "
+                        "these faces"
+                    )
+
+
+def _inner_faces(gmsh: ModuleType, dim: int, bodies: Bodies | None) -> set[int]:
+    """Return the faces between two solids of one body."""
+    found: set[int] = set()
+    for solids in _solids_of(gmsh, dim, bodies).values():
+        faces = [abs(face) for tag in solids for _, face in gmsh.model.getBoundary([(dim, tag)])]
+        found |= {face for face, times in Counter(faces).items() if times > 1}
+    return found
+
+
+def _solids_of(gmsh: ModuleType, dim: int, bodies: Bodies | None) -> dict[str, dict[int, str]]:
+    """Return the numbers of the solids of each body that is chosen, and their labels."""
+    groups = {str(label): tags for label, tags in physical_groups(gmsh, dim).items()}
+    return {
+        name: {int(tag): label for label in labels for tag in groups.get(label, ())}
+        for name, labels in _labels_of(bodies).items()
+    }
+
+
+def _labels_of(bodies: Bodies | None) -> dict[str, list[str]]:
+    """Return the labels of the parts of each body that is chosen."""
+    found = {}
+    for body, parts in (bodies if isinstance(bodies, Mapping) else {}).items():
+        inside = parts.values() if isinstance(parts, Mapping) else parts
+        found[body] = [str(label) for label in ([inside] if isinstance(inside, str | int) else inside)]
+    return found
 
 
 def _set_sizes(
@@ -376,9 +430,8 @@ def _set_sizes(
     for of in (dim, dim - 1):
         for label, tags in physical_groups(gmsh, of).items() if of else ():
             known.setdefault(str(label), []).extend((of, tag) for tag in tags)
-    for body, parts in (bodies if isinstance(bodies, Mapping) else {}).items():
-        labels = [parts] if isinstance(parts, str | int) else getattr(parts, "values", lambda: parts)()
-        known[body] = [entity for label in labels for entity in known.get(str(label), [])]
+    for body, labels in _labels_of(bodies).items():
+        known[body] = [entity for label in labels for entity in known.get(label, [])]
     if missing := [name for name in sizes if not known.get(name)]:
         raise InvalidInputError(
             f"a size must be of a body or a surface of {source}, which has {', '.join(map(repr, known))}; "
@@ -403,11 +456,11 @@ def _reasons(path: Path) -> Iterator[None]:
         ) from reason
 
 
-def _name(gmsh: ModuleType, dim: int, *, unique: bool) -> None:
-    """Add physical groups of entities if there are none of their dimension."""
+def _name(gmsh: ModuleType, dim: int, *, unique: bool, without: Collection[int] = ()) -> None:
+    """Add physical groups of entities, but for some, if there are none of their dimension."""
     if dim < 1 or gmsh.model.getPhysicalGroups(dim):
         return
-    names = {tag: name_of(gmsh, dim, tag) for _, tag in gmsh.model.getEntities(dim)}
+    names = {tag: name_of(gmsh, dim, tag) for _, tag in gmsh.model.getEntities(dim) if tag not in without}
     times = Counter(names.values())
     groups: dict[str, list[int]] = {}
     for tag, name in names.items():

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -27,11 +29,16 @@ def plate(tmp_path_factory: pytest.TempPathFactory) -> Path:
         holes.append((3, occ.addCylinder(2, -1, 0.5, 0, 5, 0, 0.2)))
         occ.cut([(3, occ.addBox(0, 0, 0, WIDE, 2, HIGH))], holes)
         occ.synchronize()
-        silent, kept = os.open(os.devnull, os.O_WRONLY), os.dup(1)
-        os.dup2(silent, 1)  # the library that writes STEP files talks
-        gmsh.write(str(path))
-        os.dup2(kept, 1)
+        write(gmsh, path)
     return path
+
+
+def write(gmsh: ModuleType, path: Path) -> None:
+    """Write a CAD file; the library that writes STEP files talks."""
+    silent, kept = os.open(os.devnull, os.O_WRONLY), os.dup(1)
+    os.dup2(silent, 1)
+    gmsh.write(str(path))
+    os.dup2(kept, 1)
 
 
 def read(path: Path, **surfaces: Any) -> BodyMesh:
@@ -200,3 +207,29 @@ def test_surfaces_and_bodies_have_their_own_sizes(plate: Path, tmp_path: Path) -
 def test_sizes_are_positive_and_of_what_exists(plate: Path, sizes: Any, words: str) -> None:
     with pytest.raises(InvalidInputError, match=words):
         read_cad(plate, 0.6, surfaces={"hole": OnCylinder(RADIUS)}, sizes=sizes)
+
+
+@pytest.fixture(scope="module")
+def cubes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two unit cubes that meet in a face, which a STEP file has twice."""
+    path = tmp_path_factory.mktemp("cad") / "cubes.step"
+    with gmsh_model("cubes") as gmsh:
+        for x in (0, 1):
+            gmsh.model.occ.addBox(x, 0, 0, 1, 1, 1)
+        gmsh.model.occ.synchronize()
+        write(gmsh, path)
+    return path
+
+
+def test_solids_of_a_body_that_share_a_face_are_offered_to_be_joined(cubes: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"'1' and '2' of body 'bar' meet in a face") as error:
+        read_cad(cubes, 0.5, bodies={"bar": [1, 2]})
+    recipe = re.search(r"join\.geo with (SetFactory.*;) and read that", str(error.value))
+    assert recipe is not None
+    joined = cubes.with_name("join.geo")
+    joined.write_text(recipe[1] + "\n")
+    bar = read_cad(joined, 0.5, bodies={"bar": [1, 2]})["bar"]
+    assert bar.volume == pytest.approx(2.0)
+    assert len(bar.surfaces) == 10  # not the face between the two
+    assert len(bar.regions) == 2
+    assert len(read_cad(cubes, 0.5)) == 2
