@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -68,6 +68,8 @@ def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray)
     without_margin = balance.left(1.0)
     part, left = (1.0 - MARGIN, left) if without_margin is None else (1.0, without_margin)
     found = _Motion.of(balance, part, left, bodies)
+    if found.slides and without_margin is not None:
+        found = _tipping(balance, bodies) or found
     # The certificate points against the right side, which is minus the load. The pushed body may take others
     # along: it is the one on which the load does most work.
     pushed = int(np.argmax(np.einsum("bm,bm->b", found.bodies, loads)))
@@ -83,7 +85,15 @@ def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray)
         f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} can "
         f"move away under the load: {found.words(pushed)} meets "
         f"{'too little friction' if found.rubs else 'no resistance'}. {found.advice(pushed, torn, bodies)}"
+        f"{found.companions(pushed, bodies)}"
     )
+
+
+def _tipping(balance: _Balance, bodies: list[RigidBody]) -> _Motion | None:
+    """Return the motion that friction without any limit would not stop, None if it would stop all."""
+    sticking = balance.sticking(bodies)
+    left = sticking.left(1.0)
+    return None if left is None else _Motion.of(sticking, 1.0, left, bodies)
 
 
 def _require_closed(torn: TornSystem, bodies: list[RigidBody], found: _Motion, along: sp.csr_matrix) -> None:
@@ -330,6 +340,13 @@ class _Balance:
             return None
         return _Left(np.array(solution.z[: len(left)]), np.array(solution.x[:size]))
 
+    def sticking(self, bodies: list[RigidBody]) -> _Balance:
+        """Return the balance with tangential forces of any size at all contact points."""
+        points = self.torn.points
+        turned = [np.einsum("nad,ndm->mna", points.tangents, body.arms(points)) for body in bodies]
+        grip = sp.csr_matrix(np.vstack([each.reshape(len(each), -1) for each in turned]))
+        return replace(self, support=sp.hstack([self.support, grip]))
+
     def motion(self, part: float, left: _Left) -> _Left:
         """Return the motion on which bodies set off, and the forces against it.
 
@@ -380,6 +397,19 @@ class _Motion:
     def words(self, body: int) -> str:
         """Return the motion of a body in words."""
         return motion_in_words(_digits(self.bodies[body]))
+
+    def companions(self, body: int, bodies: list[RigidBody]) -> str:
+        """Return words on other bodies that set off with one, of which some have no support of their own."""
+        moving = np.abs(self.bodies).max(axis=1) > MARGIN * np.abs(self.bodies).max()
+        others = {each.name for each, moves in zip(bodies, moving, strict=True) if moves} - {
+            bodies[body].name
+        }
+        if not others:
+            return ""
+        free = {each.name for each in bodies if not each.support.shape[1]}
+        names = " and ".join(repr(name) for name in sorted(others & free or others))
+        held = "has no support of its own" if others & free else "is not held in this direction either"
+        return f". With it goes {names}, which {held}: support that"
 
     def advice(self, body: int, torn: TornSystem, bodies: list[RigidBody]) -> str:
         """Return what would stop the motion of a body."""

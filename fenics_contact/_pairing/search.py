@@ -501,8 +501,8 @@ def _measured(
     if points.count == 0:
         raise InvalidInputError(
             f"{type(pair).__name__} {index} needs slave nodes that face the master, but none of the "
-            f"{np.count_nonzero(movable)} movable nodes of {pair.slave.name!r} meets it: check the "
-            "surfaces' names and where the bodies lie"
+            f"{np.count_nonzero(movable)} movable nodes of {pair.slave.name!r} meets it: "
+            f"{_cure_of_no_points(scene, pair)}"
         )
     gap = without_rounding(points.gap, slave.surface.points)
     points = replace(points, pair=np.full(points.count, index), gap=gap, distance=gap)
@@ -511,6 +511,18 @@ def _measured(
     from fenics_contact._pairing.following import on_masters
 
     return on_masters(points, scene, pair.slave.body, pair.discretisation == "mortar")
+
+
+def _cure_of_no_points(scene: Scene, pair: ContactPair | AnyTie) -> str:
+    """Return what to do where no slave node faces the master."""
+    if not isinstance(pair.master, Surface):
+        distance = evaluate_shape(pair.master, "distance", scene.bodies[pair.slave.body].mesh.points)
+        if distance.mean() < 0.0:
+            return (
+                f"body {pair.slave.body!r} lies inside the {type(pair.master).__name__}, whose normal points "
+                "out of it and towards the body: reverse it (a plane's normal), or take its other side"
+            )
+    return "check the surfaces' names and where the bodies lie"
 
 
 def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray:
