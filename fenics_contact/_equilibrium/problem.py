@@ -352,6 +352,7 @@ class ContactProblem:
         """Return the subdomains with the rows of a scene's supports, those before on other meshes."""
         held_by = self._held_by
         if self._decomposition is None:
+            self._warnings.warn_of_values(scene, self.comm)
             with self.timer.phase("decompose"):
                 self._decomposition = decompose(scene, self.partitions, self.comm, memory=self._memory)
         elif held_by is not None and scene.supports != held_by.supports and scene.has_meshes_of(held_by):

@@ -18,6 +18,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.pair_geometry import Outline, bodies_near, outline_of, unpaired
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import TILT, surface_of
+from fenics_contact._scene.plausible import odd_values
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import outside, share_areas
 from fenics_contact._surfaces.projection import node_weights, project
@@ -35,6 +36,8 @@ SHARE = 0.1
 #: Rotation [rad], as the root mean square of all cells, that triggers the warning: it strains a body of small
 #: strain by half of its square.
 FAR = 0.05
+#: Strain, likewise, at which a material of small strain, or its constants, can hardly be what is meant.
+STRAINED = 0.25
 
 _LOG = logging.getLogger(__name__)
 
@@ -48,6 +51,7 @@ class ContactWarnings:
     def __init__(self, *, of_last: bool = False) -> None:
         """Start without any."""
         self._given: set[Hashable] = set()
+        self._values: set[str] = set()
         self._held: list[tuple[Callable[..., None], str]] | None = [] if of_last else None
         self._points: ContactPoints | None = None
         self._finer = np.zeros(0)
@@ -82,6 +86,13 @@ class ContactWarnings:
                 peaks.append(doubt := missed.doubt(pair.place))
                 self._log(state, (number, "inside facets"), doubt.warning)
         object.__setattr__(state, "peak_doubts", tuple(peaks))
+
+    def warn_of_values(self, scene: Scene, comm: MPI.Comm) -> None:
+        """Warn of constants of a scene that are hardly meant, of each once, also on other meshes."""
+        for words in odd_values(scene):
+            if words not in self._values and comm.rank == 0:
+                safe_log(_LOG.warning, "%s", words)
+            self._values.add(words)
 
     def overlaps(self, state: LinearState) -> tuple[str, ...]:
         """Return words about the pairs whose surfaces overlap before they are loaded. Collective."""
@@ -154,6 +165,9 @@ class ContactWarnings:
                     "deformations, such as StVenantKirchhoff"
                 )
                 self._log(state, name, words)
+            strain = strain_of(comm, _moved_cells(state, name, body.mesh))
+            if strain > STRAINED:
+                self._log(state, (name, "strain"), _words_of_strain(name, strain))
 
     def _bound(self, state: State, name: str, body: Body) -> float:
         """Bound rotations by displacements of length one, [1/length]; once for a mesh. Collective."""
@@ -231,13 +245,23 @@ class _Gradients:
 
         `displacement`: of the nodes, shape (n_nodes, dim), [length].
         """
+        gradient = self._gradient(displacement)
+        square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
+        return np.array([square @ self.size, self.size.sum()])
+
+    def strain(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the same of the strains of cells, those around an axis left out."""
+        gradient = self._gradient(displacement)
+        square = ((gradient + gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 4.0
+        return np.array([square @ self.size, self.size.sum()])
+
+    def _gradient(self, displacement: np.ndarray) -> np.ndarray:
         gradient = np.einsum("nkd,nke->nde", self.inverse, displacement[self.corners])
         if gradient.shape[1] < gradient.shape[2]:  # with torsion
             turn = displacement[self.corners].mean(axis=1) / self.radius[:, None]
             around = np.stack([-turn[:, 2], np.zeros(len(turn)), turn[:, 0]], axis=1)
             gradient = np.concatenate([gradient, around[:, None]], axis=1)
-        square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
-        return np.array([square @ self.size, self.size.sum()])
+        return gradient
 
 
 def _moved_cells(state: State, name: str, mesh: BodyMesh) -> Iterator[tuple[_Gradients, np.ndarray]]:
@@ -260,6 +284,20 @@ def rotation_of(comm: MPI.Comm, parts: Iterable[tuple[_Gradients, np.ndarray]]) 
     """
     sums = comm.allreduce(sum((gradients.rotation(moved) for gradients, moved in parts), np.zeros(2)))
     return float(np.sqrt(sums[0] / sums[1]))
+
+
+def strain_of(comm: MPI.Comm, parts: Iterable[tuple[_Gradients, np.ndarray]]) -> float:
+    """Return by how much the cells of a body are strained, likewise. Collective."""
+    sums = comm.allreduce(sum((gradients.strain(moved) for gradients, moved in parts), np.zeros(2)))
+    return float(np.sqrt(sums[0] / sums[1]))
+
+
+def _words_of_strain(name: str, strain: float) -> str:
+    return (
+        f"body {name!r} is strained by {strain:.2g} on the average, its material is for small strains: are "
+        "Young's modulus and loads in units that belong together, such as N, mm and N/mm² (steel has 2.1e5 "
+        "N/mm²) or N, m and Pa? If they are, give it a material for large deformations"
+    )
 
 
 def _slid_far(state: State, number: int) -> list[tuple[int, str, str]]:

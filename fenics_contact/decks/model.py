@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.plausible import LONG, METALS, odd_modulus
 from fenics_contact.decks.couplings import (
     in_global_axes,
     read_axes,
@@ -214,28 +215,18 @@ class Model:
         self.origins["material", section.material] = cards.card.origin
         return build_material(cards, self.axes.get(section.orientation), of)
 
-    def _note_units(
-        self, card: Card, material: Any, mesh: BodyMesh, gigapascals: tuple[float, float] = (40.0, 420.0)
-    ) -> None:
-        """Report a Young's modulus that looks like one in other units than the lengths.
-
-        `gigapascals`: the range of metals, in which plastics and rubber in N/mm² hardly are.
-        """
+    def _note_units(self, card: Card, material: Any, mesh: BodyMesh) -> None:
+        """Report a Young's modulus that looks like one in other units than the lengths."""
         young, _ = isotropic_constants(material) or (0.0, 0.0)
         size = float(np.ptp(mesh.points, axis=0).max())
-        low, high = gigapascals
-        if low <= young <= high and size >= 50.0:
+        if METALS[0] <= young <= METALS[1] and size >= LONG:
             self.note(
                 card,
                 f"odd units? a Young's modulus of {young:g} is that of a metal in GPa, the body is {size:.4g}"
                 f" long: with lengths in mm and forces in N it would be {1e3 * young:g}",
             )
-        elif low * 1e9 <= young <= high * 1e9 and size >= 50.0:
-            self.note(
-                card,
-                f"odd units? a Young's modulus of {young:g} is that of a metal in Pa, the body is {size:.4g} "
-                "long: with it lengths are in metres",
-            )
+        elif words := odd_modulus(young, size):
+            self.note(card, f"odd units? {words}")
 
     def _note_corners(self, part: Component, mesh: BodyMesh) -> None:
         """Report elements that are turned inside out at a corner, but not at their Gauss points."""
