@@ -15,17 +15,18 @@ from fenics_contact.results.state import State
 
 
 def coarse_peak(
-    state: State, number: int, pressed_in: np.ndarray, curved: float = 0.1, most: int = 2
+    state: State, number: int, pressed_in: np.ndarray, curved: float = 0.1, most: int = 2, few: int = 2
 ) -> CoarsePeak | None:
     """Return the doubt about a pair whose largest pressure lies next to its edge, if there is one.
 
-    So it is of round bodies. Contact that ends where a surface ends, or between planes that lift off each
-    other, has no peak that more points would resolve. Where facets of the master are wider than the slave's,
-    the pressure follows them, and they count.
+    So it is of round bodies, and of flat ones that bend away from each other. Contact that ends where a
+    surface ends has no peak that more points would resolve. Where facets of the master are wider than the
+    slave's, the pressure follows them, and they count.
 
-    `pressed_in`: how far its force presses each contact point in, shape (n,), [length]; `curved`: gaps that
-    grow by this share of how far the point of the largest pressure is pressed in are curved; `most`: cells
-    from the largest pressure to the edge that leave it uncertain.
+    `pressed_in`: how far its force presses each contact point in, shape (n,), [length]; `curved`: gaps of the
+    deformed bodies that grow by this share of how far the point of the largest pressure is pressed in show
+    that contact ends there; `most`: cells from the largest pressure to the edge that leave it uncertain;
+    `few`: so many points that press resolve no pressure, wherever the others are.
     """
     contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
     mine = contact.on_pair(number)
@@ -40,22 +41,25 @@ def coarse_peak(
     joined, rim = _joined(slave)
     if rim[top] and not slave.mirrored[top].any():
         return None
+    count = int(pressing.sum())
+    if count <= few:
+        return CoarsePeak(pair.place, count, 1)
     around, wide = slave.facets[(slave.facets == top).any(axis=1)], np.zeros((0, 1, scene.dim))
     if isinstance(pair.master, Surface):
         wide = _facets_of_master(state, pair.master, int(mine[first]))
     limit = most * max(1.0, _longest(wide) / _longest(slave.points[around]))
-    gap = np.full(len(slave.nodes), np.nan)
-    gap[node[~pressing]] = contact.points.gap[mine[~pressing]]
-    edges = dijkstra(joined, unweighted=True, indices=top, limit=limit)
-    edges[np.isnan(gap)] = np.inf
+    grown = np.full(len(slave.nodes), np.nan)
+    grown[node[~pressing]] = contact.gap[mine[~pressing]] - contact.gap[mine[first]]
+    # Next to its edge a contact is hardly open: the nodes behind it count, too.
+    edges = dijkstra(joined, unweighted=True, indices=top, limit=limit + 1.0)
+    edges[np.isnan(grown)] = np.inf
     steps = edges.min()
-    grown = gap[edges == steps].min() - contact.points.gap[mine[first]] if np.isfinite(steps) else 0.0
-    if grown <= curved * pressed_in[mine[first]]:
+    if steps > limit or grown[edges <= steps + 1.0].max() <= curved * pressed_in[mine[first]]:
         return None
     way = slave.points[np.argmin(edges)] - slave.points[top]
     wider = max(1.0, _mean_width(wide, way) / _mean_width(slave.points[around], way))
     cells = int(np.ceil(steps / wider))
-    return CoarsePeak(pair.place, int(pressing.sum()), cells) if cells <= most else None
+    return CoarsePeak(pair.place, count, cells) if cells <= most else None
 
 
 def unmatched_nodes(state: State, number: int, alone: float = 0.99) -> UnmatchedNodes | None:

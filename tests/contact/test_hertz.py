@@ -251,8 +251,12 @@ def test_balls_are_told_likewise(caplog: pytest.LogCaptureFixture) -> None:
     )
 
 
-def test_plates_that_lift_off_a_floor_are_not_told(caplog: pytest.LogCaptureFixture) -> None:
-    mesh = rectangle((0.0, 0.0), (4.0, 0.5), (6, 2))
+@pytest.mark.parametrize(("cells", "points", "off"), [(6, 2, 0.5), (12, 3, 0.1)])
+def test_plates_that_lift_off_a_floor_are_told_where_two_points_press(
+    cells: int, points: int, off: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    """With 48 and 96 cells the peak is 10.26 and 10.39."""
+    mesh = rectangle((0.0, 0.0), (4.0, 0.5), (cells, cells // 3))
     middle = Traction("plate", "y1", lambda x: np.where(x[:, :1] < 0.5, 1.0, 0.0) * (0.0, -10.0))
     scene = Scene(
         {"plate": Body(mesh, PLATE)},
@@ -261,8 +265,10 @@ def test_plates_that_lift_off_a_floor_are_not_told(caplog: pytest.LogCaptureFixt
         [ContactPair(Surface("plate", "y0"), FLOOR)],
     )
     words, largest = told(caplog, scene)
-    assert words == []
-    assert largest > 0.0
+    assert [f"{points} points press, and it ends within 1 cell" in each for each in words] == [True] * (
+        points <= 2
+    )
+    assert abs(largest / 10.4 - 1.0) == pytest.approx(off, rel=0.4)
 
 
 def test_blocks_on_their_edge_are_not_told(caplog: pytest.LogCaptureFixture) -> None:

@@ -8,8 +8,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import solve_scene
+from fenics_contact import (
+    Body,
+    ContactPair,
+    RigidSphere,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+    solve_scene,
+)
 from fenics_contact._equilibrium.peaks import unmatched_nodes
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.mesh import quadratic
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.resolution import CALL, CoarsePeak, UnmatchedNodes, in_words
 from tests.contact.round_bodies import CELL, pressed
@@ -85,3 +97,42 @@ def test_doubts_follow_errors() -> None:
     assert 0.005 < np.median(errors[2]) < 0.05
     assert np.median(errors[3]) < 0.01
     assert max(errors[3]) < 0.035
+
+
+def on_a_ball(turn: float, depth: float = 0.02, radius: float = 10.0) -> LinearState:
+    """Return a block pressed on a ball by its upper side, which turns by a small angle, as plane bodies."""
+    block = Body(rectangle((-4.0, 0.0), (4.0, 4.0), (32, 16)), PlaneStrain(1000.0, 0.3))
+    down = depth - 0.5 * radius * turn**2
+    lowered = Support("block", "y1", (-4.0 * turn, lambda x: turn * x[:, 0] - down))
+    pair = ContactPair(Surface("block", "y0"), RigidSphere((0.0, -radius), radius))
+    state = solve_scene(Scene({"block": block}, [lowered], contacts=[pair]), MPI.COMM_SELF)
+    assert isinstance(state, LinearState)
+    return state
+
+
+@pytest.mark.parametrize("turn", [0.05, -0.05])
+def test_a_block_that_turns_has_the_doubt_of_one_that_does_not(turn: float) -> None:
+    """Where it turns, points of smaller gaps than those that press are open in the end."""
+    level, turned = on_a_ball(0.0), on_a_ball(turn)
+    closed = [int((each.contact.normal_force > 0.0).sum()) for each in (level, turned)]
+    assert min(closed) > 2
+    assert [doubt.cells for doubt in level.peak_doubts if isinstance(doubt, CoarsePeak)] == [2]
+    assert [doubt.cells for doubt in turned.peak_doubts if isinstance(doubt, CoarsePeak)] == [2]
+
+
+def test_one_point_that_a_bent_strip_presses_is_in_doubt() -> None:
+    """Its force is 14 % off that of beam theory, as the lowest point of the ball lies between two nodes."""
+    strip = Body(quadratic(rectangle((0.0, 0.0), (40.0, 1.0), (25, 2))), PlaneStrain(1e5, 0.0))
+    tip, gap, at, stiffness = 0.234, 0.3, 38.8, 1e5 / 12.0
+    pair = ContactPair(Surface("strip", "y1"), RigidSphere((at, 1.0 + gap + 2.0), 2.0))
+    scene = Scene(
+        {"strip": strip}, [Support("strip", "x0")], [Traction("strip", "x1", (0.0, tip))], [pair]
+    )
+    state = solve_scene(scene, MPI.COMM_SELF)
+    assert isinstance(state, LinearState)
+    free = tip * at**2 * (3.0 * 40.0 - at) / (6.0 * stiffness)
+    beam = 3.0 * stiffness * (free - gap) / at**3
+    assert 0.8 < state.contact.normal_force.sum() / beam < 0.9
+    (doubt,) = state.peak_doubts
+    assert isinstance(doubt, CoarsePeak)
+    assert (doubt.points, doubt.cells) == (1, 1)
