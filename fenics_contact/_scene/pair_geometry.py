@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._scene.loads import (
     BodyForce,
     InitialStress,
@@ -34,6 +35,7 @@ from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import simplices_in
 from fenics_contact.mesh.faces import boundary_faces, corners_of, vector_areas
+from fenics_contact.mesh.quality import determinants
 from fenics_contact.shapes.combined import Joined, Placed
 from fenics_contact.shapes.simple import SurfaceShape, evaluate_shape, tangent_bases
 from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
@@ -645,7 +647,8 @@ def _in_simplices(
     place = np.concatenate([*close, np.zeros(0)]).astype(np.int64)
     start, sides = corners[:, 0], np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     simplex = np.repeat(np.arange(len(corners)), count)
-    full = np.abs(np.linalg.det(sides)) > 0.0
+    # Simplices that are flat to rounding hold nothing.
+    full = np.abs(determinants(sides / radius[:, None, None])) > LAST_PLACES
     kept = full[simplex]
     place, simplex = place[kept], simplex[kept]
     rest = np.linalg.solve(sides[simplex], (places[place] - start[simplex])[..., None])[..., 0]

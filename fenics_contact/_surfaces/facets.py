@@ -500,7 +500,14 @@ def faceted_surface(
     # A surface that lies in the plane itself is not cut by it.
     flat &= (np.linalg.norm(within, axis=1) > CUT * np.linalg.norm(summed, axis=1))[:, None]
     summed = within_planes(summed, flat, planes)
-    averaged = summed / np.linalg.norm(summed, axis=1)[:, None]
+    size = np.linalg.norm(summed, axis=1)
+    if not (size > 0.0).all():
+        at = ", ".join(f"{x:.6g}" for x in own[np.argmin(size)])
+        raise InvalidInputError(
+            f"every node of a surface must have a normal, that at ({at}) has none, as its facets have no "
+            "area there or fold back: correct the mesh, or leave these facets out of the surface"
+        )
+    averaged = summed / size[:, None]
     return FacetedSurface(nodes, local, own, averaged, _linear_areas(own, local), flat, planes=planes)
 
 

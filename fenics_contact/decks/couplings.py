@@ -101,7 +101,7 @@ def require_own_nodes(users: Sequence[tuple[Card, int]], mesh: DeckMesh) -> None
 
 
 def _range(card: Card, row: int) -> range:
-    numbers = [int(n) for n in card.floats(row)]
+    numbers = card.wholes(np.array(card.floats(row)), row).tolist()
     return range(numbers[0], (numbers[1] if len(numbers) > 1 and numbers[1] else numbers[0]) + 1)
 
 
@@ -222,7 +222,9 @@ def read_equations(cards: Sequence[Card], mesh: DeckMesh) -> list[Equation]:
             raise card.error("REMOVE is not read: leave the equation out")
         row = 0
         while row < len(card.rows):
-            first, count = row, int(card.floats(row)[0])
+            first, count = row, card.whole(card.rows[row][0], row)
+            if count < 1:
+                raise card.error(f"needs the number of its terms, got {card.rows[row][0]!r}: correct it", row)
             entries: list[str] = []
             while len(entries) < 3 * count:
                 row += 1
@@ -234,8 +236,10 @@ def read_equations(cards: Sequence[Card], mesh: DeckMesh) -> list[Equation]:
             nodes = [mesh.nodes_named(token, card, row) for token in entries[: 3 * count : 3]]
             if any(len(each) != 1 for each in nodes):
                 raise card.error("needs single nodes, got a set of several: write an equation for each", row)
-            numbers = [float(token) for token in entries[2 : 3 * count : 3]]
-            parts = [int(token) - 1 for token in entries[1 : 3 * count : 3]]
+            numbers = [card.number(token, row) for token in entries[2 : 3 * count : 3]]
+            parts = [card.whole(token, row) - 1 for token in entries[1 : 3 * count : 3]]
+            if not all(0 <= part < 6 for part in parts):
+                raise card.error(f"components must be from 1 to 6, got {1 + min(parts)}: correct them", row)
             found.append(Equation(card, first, tuple(int(n[0]) for n in nodes), tuple(parts), tuple(numbers)))
             row += 1
     return found

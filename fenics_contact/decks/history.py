@@ -185,7 +185,6 @@ class _Course:
         for row, entries in enumerate(card.rows):
             nodes = self.mesh.nodes_named(entries[0], card, row)
             components, value = _components(card, row, entries)
-            _check_span(card, row, min(components) + 1, max(components) + 1)
             inside = tuple(components)
             self.targets.append(Held(plain(entries[0]), nodes, inside, card, row))
             for k in inside:
@@ -194,9 +193,9 @@ class _Course:
 
     def _hold_single(self, card: Card, table: np.ndarray, fixed: bool, by: int) -> None:
         """Hold single nodes by their numbers, lines alike in their components at once."""
-        nodes = self.mesh.positions(table[:, 0].astype(np.int64), "node", card, by_row=True)
-        first = table[:, 1].astype(int)
-        last = np.where(table[:, 2] > 0, table[:, 2], first).astype(int) if table.shape[1] > 2 else first
+        nodes = self.mesh.positions(card.wholes(table[:, 0]), "node", card, by_row=True)
+        first = card.wholes(table[:, 1])
+        last = card.wholes(np.where(table[:, 2] > 0, table[:, 2], first)) if table.shape[1] > 2 else first
         value = table[:, 3] if table.shape[1] > 3 else np.zeros(len(table))
         for span in np.unique(np.column_stack([first, last]), axis=0).tolist():
             rows = np.flatnonzero((first == span[0]) & (last == span[1]))
@@ -220,8 +219,8 @@ class _Course:
             self.force[:] = 0.0
         by, table = self._by(card), card.numbers_alone
         if table is not None and table.shape[1] > 2 and ((table[:, 1] >= 1) & (table[:, 1] <= 6)).all():
-            nodes = self.mesh.positions(table[:, 0].astype(np.int64), "node", card, by_row=True)
-            at = nodes, table[:, 1].astype(int) - 1
+            nodes = self.mesh.positions(card.wholes(table[:, 0]), "node", card, by_row=True)
+            at = nodes, card.wholes(table[:, 1]) - 1
             self.force[at] = np.where(touched[at], self.force[at], 0.0)
             np.add.at(self.force, at, table[:, 2])
             self.force_by[at], touched[at] = by, True
@@ -231,7 +230,7 @@ class _Course:
             numbers = card.floats(row, 1)
             if len(numbers) < 2 or not 1 <= numbers[0] <= 6:
                 raise card.error("needs node or set, component and force: complete the line", row)
-            component = int(numbers[0]) - 1
+            component = int(card.wholes(np.array(numbers[:1]), row)[0]) - 1
             kept = np.where(touched[nodes, component], self.force[nodes, component], 0.0)
             self.force[nodes, component] = kept + numbers[1]
             self.force_by[nodes, component] = by
@@ -374,7 +373,7 @@ def _assign(values: np.ndarray, card: Card, mesh: DeckMesh) -> None:
     """Give nodes the values of a card, in place."""
     table = card.numbers_alone
     if table is not None and table.shape[1] > 1:
-        values[mesh.positions(table[:, 0].astype(np.int64), "node", card, by_row=True)] = table[:, 1]
+        values[mesh.positions(card.wholes(table[:, 0]), "node", card, by_row=True)] = table[:, 1]
         return
     for row, entries in enumerate(card.rows):
         given = card.floats(row, 1)
@@ -388,6 +387,10 @@ def _check_span(card: Card, row: int, first: int, last: int) -> None:
     if first < 1:
         raise card.error(
             "needs a node or set and the first component to hold, from 1: complete the line", row
+        )
+    if last < first:
+        raise card.error(
+            f"the first component must not be above the last, got {first} and {last}: exchange them", row
         )
     if last > 6:
         raise card.error(
@@ -405,8 +408,9 @@ def _components(card: Card, row: int, entries: Sequence[str]) -> tuple[range | t
         raise card.error(
             "needs a node or set and the first component to hold, from 1: complete the line", row
         )
-    first = int(numbers[0])
-    last = int(numbers[1]) if len(numbers) > 1 and numbers[1] else first
+    first, *rest = card.wholes(np.array(numbers[:2]), row).tolist()
+    last = rest[0] if rest and rest[0] else first
+    _check_span(card, row, first, last)
     return range(first - 1, last), numbers[2] if len(numbers) > 2 else 0.0
 
 

@@ -83,8 +83,8 @@ def _at_points(card: Card, mesh: DeckMesh, stress: np.ndarray, note: Callable[[C
     table = card.numbers_alone
     if table is None:
         table = np.array([card.floats(row) for row in range(len(card.rows))])
-    element = mesh.positions(table[:, 0].astype(np.int64), "element", card, by_row=True)
-    point, given = table[:, 1].astype(int), table[:, 2:]
+    element = mesh.positions(card.wholes(table[:, 0]), "element", card, by_row=True)
+    point, given = card.wholes(table[:, 1]), table[:, 2:]
     here, place, count = np.unique(element, return_inverse=True, return_counts=True)
     place = place.ravel()
     last = np.zeros(len(here), dtype=int)

@@ -304,7 +304,7 @@ def _orthotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
         e1, e2, e3, n12, n13, n23, g12, g13, g23 = _row(card, 9, of, "nine constants")
     elif kind in ("ORTHO", "ORTHOTROPIC"):
         d11, d12, d22, d13, d23, d33, g12, g13, g23 = _row(card, 9, of, "nine stiffnesses")
-        c = np.linalg.inv(np.array([[d11, d12, d13], [d12, d22, d23], [d13, d23, d33]]))
+        c = _compliance(card, np.array([[d11, d12, d13], [d12, d22, d23], [d13, d23, d33]]))
         e1, e2, e3 = (float(v) for v in 1.0 / np.diag(c))
         n12, n13, n23 = float(-c[0, 1] * e1), float(-c[0, 2] * e1), float(-c[1, 2] * e2)
     else:
@@ -322,6 +322,26 @@ def _orthotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
         raise card.error(f"TYPE={kind} in plane strain has no counterpart: take solid elements")
     thermal = None if alpha is None else (alpha[0], alpha[1], alpha[2])
     return OrthotropicElasticity((e1, e2, e3), (n12, n13, n23), (g12, g13, g23), rows, thermal)  # type: ignore[arg-type]
+
+
+def _compliance(card: Card, moduli: np.ndarray, least: float = 1e-12) -> np.ndarray:
+    """Return the inverse of stiffnesses, (3, 3), which must store energy in every stretch."""
+    size = np.linalg.eigvalsh(moduli)
+    if not size[0] > least * size[-1]:
+        raise card.error(
+            "stiffnesses must be such that every stretch stores energy, but the matrix of D1111 to D3333 has "
+            f"the eigenvalue {size[0]:.3g} beside {size[-1]:.3g}: give directions without stiffness a small "
+            "one, such as a thousandth of the largest"
+        )
+    return np.asarray(np.linalg.inv(moduli))
+
+
+def _order(card: Card) -> int:
+    """Return the number of terms of a material."""
+    order = card.number_of("N", 1.0)
+    if order not in range(1, 10):
+        raise card.error(f"N must be a number of terms from 1 to 9, got {order:g}: correct it")
+    return int(order)
 
 
 #: Place of 11, 22, 33, 12, 13, 23, the order of the deck, among xx, yy, zz, yz, xz, xy.
@@ -347,7 +367,7 @@ def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:
         raise card.error("needs NLGEOM in its *STEP, as rubber is for large deformations: add it")
     if of.kind == "plane stress":
         raise card.error("plane stress with rubber has no counterpart: take solid or plane strain elements")
-    flags, order = set(card.parameters), int(card.number_of("N", 1.0))
+    flags, order = set(card.parameters), _order(card)
     if flags & {"NEOHOOKE"}:
         c10, d1 = _row(card, 2, of, "C10 and D1")
         c01 = 0.0
@@ -358,6 +378,8 @@ def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:
         pairs, volumes = np.array(values[: 2 * order]).reshape(-1, 2), values[2 * order :]
         if any(volumes[1:]):
             raise card.error("D2, D3, ... of *HYPERELASTIC, OGDEN have no counterpart: give them as zero")
+        if not pairs[:, 1].all():
+            raise card.error("exponents α must not be zero, got one that is: leave the term out")
         moduli = tuple(float(2 * mu / alpha) for mu, alpha in pairs)
         bulk = _bulk(volumes[0], float(sum(pairs[:, 0])))
         exponents, own = tuple(map(float, pairs[:, 1])), _heated(parts, of)
@@ -374,7 +396,7 @@ def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:
 def _foam(parts: Mapping[str, Card], of: Conditions) -> Material:
     card = parts["HYPERFOAM"]
     _require_large_solid(card, of)
-    order = int(card.number_of("N", 1.0))
+    order = _order(card)
     values = _row(card, 3 * order, of, "μ and α, and behind them ν, of each term")
     pairs = np.array(values[: 2 * order]).reshape(-1, 2)
     moduli, exponents = (tuple(map(float, column)) for column in pairs.T)

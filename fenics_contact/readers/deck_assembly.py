@@ -254,8 +254,8 @@ def _members(card: Card, instance: str, offset: int, stride: int) -> list[str]:
         for entry in row[:count]:
             if not entry.isdecimal():
                 own.append(f"{instance}.{plain(entry)}" if entry else entry)
-            elif int(entry) < stride or ranges:  # of ranges numbers may be missing
-                own.append(str(min(int(entry), stride - 1) + offset))
+            elif int(entry[:20]) < stride or ranges:  # of ranges numbers may be missing
+                own.append(str(min(int(entry[:20]), stride - 1) + offset))
             else:
                 raise card.error(f"{instance}.{entry} is not there: correct the number", number)
         lines.append(", ".join([*own, *(row[count:] if count else [])]))
@@ -297,7 +297,7 @@ def _resolved(card: Card, instances: Instances, assembly: str) -> Card:
             return text
         if not tail.isdecimal():
             return name
-        if int(tail) >= instances.stride:
+        if int(tail[:20]) >= instances.stride:
             raise card.error(f"{name} is not there: correct the number", row)
         return str(instances.offset(head) + int(tail))
 

@@ -9,9 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fenics_contact._base.checks import require_file
+from fenics_contact._base.checks import LARGEST, require_file
 from fenics_contact._base.progress import visible
 from fenics_contact.errors import InvalidInputError
+
+#: Largest number of a node or element, as in the other programs.
+MOST_NUMBERS = 2**31 - 1
 
 
 class DeckError(InvalidInputError):
@@ -149,9 +152,30 @@ class Card:
 
     def _number(self, text: str, what: str, row: int | None) -> float:
         try:
-            return float(text.upper().replace("D", "E"))
+            value = float(text.upper().replace("D", "E"))
         except ValueError:
             raise self.error(f"{what} must be a number, got {text!r}: correct it", row) from None
+        if not abs(value) < LARGEST:
+            raise self.error(f"{what} must be finite and below {LARGEST:g}, got {text!r}: correct it", row)
+        return value
+
+    def number(self, text: str, row: int) -> float:
+        """Return an entry of a data line as a number."""
+        return self._number(text, "an entry", row)
+
+    def whole(self, text: str, row: int) -> int:
+        """Return an entry of a data line, or a count, as a whole number."""
+        return int(self.wholes(np.array([self.number(text, row)]), row)[0])
+
+    def wholes(self, values: np.ndarray, row: int | None = None) -> np.ndarray:
+        """Return numbers, one of each data line or those of one, as whole ones, (n,)."""
+        wrong = np.flatnonzero((values != np.round(values)) | (np.abs(values) > MOST_NUMBERS))
+        if len(wrong):
+            raise self.error(
+                f"numbers of nodes, elements and components must be whole and at most {MOST_NUMBERS}, got "
+                f"{values[wrong[0]]:g}: correct it", int(wrong[0]) if row is None else row,
+            )  # fmt: skip
+        return values.astype(np.int64)
 
     @cached_property
     def rows(self) -> list[list[str]]:
@@ -233,17 +257,18 @@ def _numbers(text: str, kind: type) -> np.ndarray | None:
     if kind is float and ("D" in text or "d" in text):
         text = text.replace("D", "E").replace("d", "e")
     try:
-        return np.array(text.split(","), dtype=np.float64 if kind is float else np.int64)
+        values = np.array(text.split(","), dtype=np.float64 if kind is float else np.int64)
     except (ValueError, OverflowError):
         return None
+    return values if kind is not float or (np.abs(values) < LARGEST).all() else None
 
 
 def whole_numbers(card: Card) -> np.ndarray:
     """Return the whole numbers with which the lines of nodes or elements begin, or all of elements."""
     if card.name == "NODE":
-        return np.asarray(card.table(1)[:, 0], dtype=np.int64)
+        return card.wholes(card.table(1)[:, 0])
     found = _numbers(",".join(line.strip().rstrip(",") for line in card.lines), np.int64)
-    return np.zeros(0, dtype=np.int64) if found is None else found
+    return np.zeros(0, dtype=np.int64) if found is None else np.minimum(found, MOST_NUMBERS)
 
 
 #: Most files that include each other, one inside the other.

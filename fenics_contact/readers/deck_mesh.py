@@ -97,16 +97,17 @@ class DeckMesh:
     def nodes_named(self, token: str, card: Card, row: int | None = None) -> np.ndarray:
         """Return the positions of the nodes of a set, or of one node by its number."""
         if token.isdecimal():
-            place = int(np.searchsorted(self.numbers, int(token)))
-            if place < len(self.numbers) and self.numbers[place] == int(token):
+            number = _written(token)
+            place = int(np.searchsorted(self.numbers, number))
+            if place < len(self.numbers) and self.numbers[place] == number:
                 return np.array([place])
-            return self.positions(np.array([int(token)]), "node", card, row)
+            return self.positions(np.array([number]), "node", card, row)
         return _known(self.node_sets, token, "node set", card, row)
 
     def elements_named(self, token: str, card: Card, row: int | None = None) -> np.ndarray:
         """Return the positions of the elements of a set, or of one element by its number."""
         if token.isdecimal():
-            return self.positions(np.array([int(token)]), "element", card, row)
+            return self.positions(np.array([_written(token)]), "element", card, row)
         return _known(self.element_sets, token, "element set", card, row)
 
     def surface_named(self, token: str, card: Card, row: int | None = None) -> Named:
@@ -176,6 +177,11 @@ class DeckMesh:
         return Faces(elements, np.full(len(elements), side))
 
 
+def _written(token: str) -> int:
+    """Return a number as it is written, one that is too large for any node as the largest of all."""
+    return min(int(token[:20]), np.iinfo(np.int64).max)
+
+
 T = TypeVar("T")
 
 
@@ -230,17 +236,22 @@ def _nodes(cards: Sequence[Card]) -> tuple[np.ndarray, np.ndarray, dict[int, np.
     for card in cards:
         if card.name_of("SYSTEM") not in ("", "R"):
             raise card.error(f"SYSTEM={card.name_of('SYSTEM')} is not read: give coordinates x, y and z")
+        if not card.lines:
+            raise card.error("needs nodes, it has no data lines: add them, or leave the card out")
         tables[id(card)] = card.table(4)
     every = np.concatenate(list(tables.values()))
     # The last definition of a node counts.
-    numbers, last = np.unique(every[::-1, 0].astype(np.int64), return_index=True)
-    return numbers, every[::-1][last, 1:], {key: rows[:, 0].astype(np.int64) for key, rows in tables.items()}
+    own = {id(card): card.wholes(tables[id(card)][:, 0]) for card in cards}
+    numbers, last = np.unique(np.concatenate(list(own.values()))[::-1], return_index=True)
+    return numbers, every[::-1][last, 1:], own
 
 
 def _elements(mesh: DeckMesh, cards: Sequence[Card]) -> None:
     first = 0
     for card in cards:
         element = element_of(card)
+        if not card.lines:
+            raise card.error("needs elements, it has no data lines: add them, or leave the card out")
         width = 1 + element.count
         lengths = {len(row) for row in card.rows}
         # Preprocessors add nodes inside, of bubbles, which the other program overlooks.
@@ -279,7 +290,7 @@ def _members(mesh: DeckMesh, card: Card, what: str) -> np.ndarray:
     for row, entries in enumerate(card.rows):
         for entry in entries:
             if entry.isdecimal():
-                single.append(int(entry))
+                single.append(_written(entry))
             elif entry:
                 named = mesh.nodes_named if what == "node" else mesh.elements_named
                 found.append(named(entry, card, row))
@@ -288,7 +299,7 @@ def _members(mesh: DeckMesh, card: Card, what: str) -> np.ndarray:
 
 def _generated(mesh: DeckMesh, card: Card, what: str, known: np.ndarray) -> np.ndarray:
     """Return what is there of the numbers from, to, by; as in the other programs gaps are allowed."""
-    wanted = []
+    wanted = np.zeros(len(known), dtype=bool)
     for row in range(len(card.rows)):
         first, last, *step = card.floats(row)[:3] if len(card.rows[row]) > 1 else (*card.floats(row), 0)
         by = int(step[0]) if step and step[0] else 1
@@ -297,8 +308,8 @@ def _generated(mesh: DeckMesh, card: Card, what: str, known: np.ndarray) -> np.n
                 f"GENERATE needs a first number, a last one that is not smaller, and an increment above "
                 f"zero, got {card.lines[row].strip()!r}", row,
             )  # fmt: skip
-        wanted.append(np.arange(int(first), int(last) + 1, by))
-    return np.flatnonzero(np.isin(known, np.concatenate(wanted)))
+        wanted |= (known >= int(first)) & (known <= int(last)) & ((known - int(first)) % by == 0)
+    return np.flatnonzero(wanted)
 
 
 def nodes_of(mesh: DeckMesh, elements: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import pytest
 
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, quadrature_areas, shape_functions
 from fenics_contact._surfaces.projection import Projection, project
+from fenics_contact.errors import InvalidInputError
 
 CORNERS = [4, 3]
 Height = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -297,3 +298,9 @@ def test_of_facets_that_share_a_point_the_first_is_taken(corners: int, size: flo
     lowest = np.array([np.argmax((flat.facets == node).any(axis=1)) for node in range(len(flat.points))])
     np.testing.assert_array_equal(found.facet, np.concatenate([lowest, facet_of_side[first]]))
     np.testing.assert_allclose(found.gap, 0.03 * size, rtol=1e-12 + 1e-14 * shift)
+
+
+def test_a_node_without_a_normal_is_named_by_its_place() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 3, 0], [2, 3, 0]])
+    with pytest.raises(InvalidInputError, match=r"must have a normal, that at \(2, 3, 0\) has none"):
+        faceted_surface(points, np.array([[0, 1, 2], [2, 3, 4]]))
