@@ -145,6 +145,18 @@ def test_errors_are_estimates_and_what_these_turned_out_to_miss():
     assert error_after([112.0, 112.0], [9.0, 4.0, 3.0], 111.0, -1.0) == pytest.approx(7.0)
 
 
+def test_changes_that_fall_slowly_to_one_side_leave_more():
+    """A value of 100 that is missed by 20, 16, 12.8, 10.24 and so on, of which estimates see a tenth."""
+    off = [20.0 * 0.8**k for k in range(5)]
+    error = error_after([100.0 - each for each in off[:4]], [9.0, 3.0, 1.0], 100.0 - off[4] - 0.5, 0.5)
+    assert error == pytest.approx(0.5 + off[4])
+    # Twice, or to the other side in between, may be chance.
+    assert error_after([80.0, 84.0], [9.0, 3.0, 1.0], 86.7, 0.5) == pytest.approx(0.5 + 3.2)
+    assert error_after([90.0, 80.0, 84.0], [9.0, 3.0, 1.0], 83.2, 4.0) == pytest.approx(4.0 + 3.2)
+    # Changes that do not fall at all.
+    assert error_after([80.0, 81.0, 82.0], [9.0, 3.0, 1.0], 83.0, 0.0) == pytest.approx(19.0)
+
+
 def test_without_adjoint_errors_go_on_to_fall_as_changes_do():
     def error(*values):
         return error_after([*values[:2]], [9.0, 3.0, 1.0], values[2], 0.0, without_adjoint="none")
