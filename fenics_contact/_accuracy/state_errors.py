@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact._accuracy.certificate import Certificate, certify, direct_error
 from fenics_contact._accuracy.discretisation import DiscretisationError
+from fenics_contact._base.display import Table, tabled
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dual import DualSystem
@@ -43,6 +44,7 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     return min(by_law, largest * certificate.bound) + by_limit
 
 
+@tabled
 @dataclass(frozen=True, eq=False)
 class StateErrors:
     """Errors of a state in energy norm, relative to that of the displacement, ‖u‖ = √(uᵀK u).
@@ -114,9 +116,9 @@ class StateErrors:
             words["geometry"] += f", {100 * self.peak_by_geometry:.2g} % in peak pressure"
         return words
 
-    def __str__(self) -> str:
-        """Return one line for each error."""
-        return "\n".join(f"{name:15s} {words}" for name, words in self.in_words.items())
+    def _tables(self) -> list[Table]:
+        """Return a table with one line for each error."""
+        return [Table(list(self.in_words.items()), 2, headed=False)]
 
 
 @dataclass(frozen=True)

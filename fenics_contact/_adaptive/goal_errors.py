@@ -36,7 +36,7 @@ from fenics_contact._accuracy.discretisation import (
 from fenics_contact._adaptive.boundary_errors import EnergyShares, between_facets
 from fenics_contact._adaptive.contact_residuals import between_nodes, of_pressures
 from fenics_contact._adaptive.indicator import stress_indicator
-from fenics_contact._base.display import displayed
+from fenics_contact._base.display import Table, tabled
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import Task
 from fenics_contact._base.threads import one_thread
@@ -65,7 +65,7 @@ from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State, comm_of
 
 
-@displayed
+@tabled
 @dataclass(frozen=True, eq=False)
 class GoalError:
     """Estimated parts of J − J_h, the exact value of a quantity less that of a state, in its unit.
@@ -130,9 +130,9 @@ class GoalError:
             return f"not known: {self.without_adjoint}"
         return f"{part:+.3g} ({100 * part / abs(self.value):+.2g} %)" if self.value else f"{part:+.3g}"
 
-    def __str__(self) -> str:
-        """Return one line for each part."""
-        return "\n".join(f"{name:10s}{words}" for name, words in self.in_words.items())
+    def _tables(self) -> list[Table]:
+        """Return a table with one line for each part."""
+        return [Table(list(self.in_words.items()), 2, headed=False)]
 
 
 def _comm_of(state: State, *_: object, **__: object) -> MPI.Comm:

@@ -16,7 +16,7 @@ from fenics_contact._adaptive.quantities import quantity as named
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
 from fenics_contact._adaptive.small_spots import doubted_pairs, refined_at_spots
 from fenics_contact._base.checks import check_numbers, checked
-from fenics_contact._base.display import displayed
+from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.memory import available_memory
 from fenics_contact._base.progress import Task
@@ -29,7 +29,6 @@ from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.errors.kinds import safe_log, user_code
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.qp.solve import DualSolver
-from fenics_contact.results.forces import aligned
 from fenics_contact.results.resolution import BetweenNodes
 from fenics_contact.results.state import State
 
@@ -71,7 +70,7 @@ class Level:
         return (*numbers, f"{self.seconds:.2f}", predicted)
 
 
-@displayed
+@tabled
 @dataclass(frozen=True, eq=False)
 class AccurateResult:
     """A quantity with its error, and the meshes on the way.
@@ -100,11 +99,11 @@ class AccurateResult:
         """The error relative to the value."""
         return _relative(self.error, self.value)
 
-    def __str__(self) -> str:
+    def _tables(self) -> list[Table]:
         """Return a table with one line for each mesh, and how it ended."""
         head = ("cells", "unknowns", "value", "error", "products", "seconds", "predicted")
         rows: list[tuple[str, ...]] = [head, *(level.in_words for level in self.levels)]
-        return "\n".join([*aligned(rows, 0), self.reason])
+        return [Table(rows, 0, (self.reason,))]
 
 
 def _relative(error: float, value: float) -> float:

@@ -14,7 +14,7 @@ from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, Way, 
 from fenics_contact._adaptive.refined_designs import refined_design, refined_for_designs
 from fenics_contact._adaptive.refined_scene import SceneRefinement
 from fenics_contact._adaptive.small_spots import doubted_pairs, refined_at_spots
-from fenics_contact._base.display import displayed
+from fenics_contact._base.display import Table, tabled
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._optimize.bundle_trust import BundleTrust, minimize
 from fenics_contact._optimize.constraints import Box, Constraints
@@ -27,14 +27,13 @@ from fenics_contact.design.sensitivity import products_of
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.mesh.cell_types import CELL_TYPES
-from fenics_contact.results.forces import aligned
 from fenics_contact.results.state import State
 
 #: Constraints on every mesh, or what makes them for the problem on a mesh.
 ConstraintsOf: TypeAlias = "Constraints | Callable[[ShapeProblem], Constraints]"
 
 
-@displayed
+@tabled
 @dataclass(frozen=True, eq=False)
 class AccurateDesign(AccurateResult):
     """An optimised design with the error of its objective, and the meshes on the way.
@@ -57,7 +56,7 @@ class AccurateDesign(AccurateResult):
         """The design variables, shape (size,), [length]."""
         return self.optimisations[-1].x
 
-    def __str__(self) -> str:
+    def _tables(self) -> list[Table]:
         """Return a table with one line for each mesh, and how it ended."""
         head = ("cells", "unknowns", "start", "least", "error", "designs", "products", "seconds", "predicted")
         rows: list[tuple[str, ...]] = [head]
@@ -65,7 +64,7 @@ class AccurateDesign(AccurateResult):
             cells, unknowns, _, error, *cost = level.in_words
             both = (f"{result.history[0].value:.6g}", f"{level.state_value:.6g}")
             rows.append((cells, unknowns, *both, error, f"{result.evaluations}", *cost))
-        return "\n".join([*aligned(rows, 0), self.reason])
+        return [Table(rows, 0, (self.reason,))]
 
 
 @collectively("minimize_to", lambda problem, x0, relative_error, *_, **__: problem.comm)

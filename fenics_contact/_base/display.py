@@ -1,16 +1,19 @@
-"""Objects on a screen: a few lines of facts instead of their arrays, and a table in notebooks."""
+"""Objects on a screen: a few lines of facts or tables instead of their arrays, and tables in notebooks."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from typing import Any, TypeVar
 
 import numpy as np
 
-__all__ = ["counted", "displayed", "force_units", "in_lines", "in_short", "name_in_words"]
+__all__ = [
+    "Table", "counted", "displayed", "force_units", "in_lines", "in_notebooks", "in_short", "name_in_words",
+    "tabled",
+]  # fmt: skip
 
 Class = TypeVar("Class", bound=type)
 
@@ -45,6 +48,101 @@ def displayed(cls: Class) -> Class:
     cls.__repr__ = in_lines  # type: ignore[assignment]
     cls._repr_html_ = _in_table  # type: ignore[attr-defined]
     return cls
+
+
+def in_notebooks(cls: Class) -> Class:
+    """Let a class show its facts as a table in notebooks alone. Place it above ``@dataclass``."""
+    cls._repr_html_ = _in_table  # type: ignore[attr-defined]
+    return cls
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text.
+
+    Attributes:
+        rows: Cells of each row, all rows of one length; the first has the names of the columns.
+        names: Number of columns that are words and lie to the left; numbers lie to the right.
+        notes: Lines behind it.
+        headed: Whether the first row has names.
+    """
+
+    rows: Sequence[tuple[str, ...]]
+    names: int
+    notes: tuple[str, ...] = ()
+    headed: bool = True
+
+    def lines(self) -> list[str]:
+        """Return it as lines of text."""
+        width = [max(map(len, column)) for column in zip(*self.rows, strict=True)]
+        rows = [
+            "  ".join(
+                cell.ljust(size) if k < self.names else cell.rjust(size)
+                for k, (cell, size) in enumerate(zip(row, width, strict=True))
+            ).rstrip()
+            for row in self.rows
+        ]
+        return [*rows, *self.notes]
+
+    def html(self, caption: str) -> str:
+        """Return it in HTML, the notes behind the caption."""
+        from html import escape
+
+        def row(cells: tuple[str, ...], kind: str) -> str:
+            sides = ("left" if k < self.names else "right" for k in range(len(cells)))
+            parts = (
+                f'<{kind} style="text-align: {side}">{escape(cell)}</{kind}>'
+                for cell, side in zip(cells, sides, strict=True)
+            )
+            return f"<tr>{''.join(parts)}</tr>"
+
+        kinds = ["th" if self.headed else "td", *["td"] * (len(self.rows) - 1)]
+        body = "".join(map(row, self.rows, kinds))
+        return f"<table><caption>{escape('; '.join([caption, *self.notes]))}</caption>{body}</table>"
+
+
+def tabled(cls: Class) -> Class:
+    """Let a class show the tables of its method ``_tables``, printed, as its ``repr``, and in notebooks.
+
+    A ``repr`` is cut to some lines. Place it above ``@dataclass``.
+
+    Example:
+        >>> @tabled
+        ... @dataclass(frozen=True)
+        ... class Wires:
+        ...     radii: dict[str, float]
+        ...     def _tables(self) -> list[Table]:
+        ...         rows = [(name, f"{radius:.5g}") for name, radius in self.radii.items()]
+        ...         return [Table([("", "radius"), *rows], 1, ("in [length]",))]
+        >>> Wires({"thin": 0.1, "thick": 2.5})
+               radius
+        thin      0.1
+        thick     2.5
+        in [length]
+    """
+    cls.__str__ = _printed  # type: ignore[assignment]
+    cls.__repr__ = _printed_in_short  # type: ignore[assignment]
+    cls._repr_html_ = _in_tables  # type: ignore[attr-defined]
+    return cls
+
+
+def _printed(shown: Any) -> str:
+    """Return its tables as text, "none" without any."""
+    return "\n".join(line for table in shown._tables() for line in table.lines()) or "none"
+
+
+def _printed_in_short(shown: Any) -> str:
+    """Return its tables as text, or the first lines and how many follow."""
+    lines = _printed(shown).splitlines()
+    if len(lines) > LINES:
+        lines = [*lines[: LINES - 1], f"… {len(lines) - LINES + 1} more lines: print it"]
+    return "\n".join(_cut(line, COLUMNS) for line in lines)
+
+
+def _in_tables(shown: Any) -> str:
+    """Return its tables in HTML, as notebooks show them."""
+    name = type(shown).__name__
+    return "".join(table.html(name) for table in shown._tables()) or f"{name}: none"
 
 
 def in_lines(shown: Any, most: int = LINES, columns: int = COLUMNS) -> str:

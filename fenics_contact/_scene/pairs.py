@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from fenics_contact._base.checks import checked
-from fenics_contact._base.display import name_in_words
+from fenics_contact._base.display import Table, in_notebooks, in_short, name_in_words, tabled
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
@@ -127,6 +127,7 @@ class Tresca:
 Friction: TypeAlias = Coulomb | Tresca | None
 
 
+@in_notebooks
 @dataclass(frozen=True)
 @checked()
 class ContactPair:
@@ -224,6 +225,9 @@ class ContactPair:
     def by_mortar(self) -> bool:
         """Whether weighted means are compared: contact with a rigid obstacle is always nodal."""
         return isinstance(self.master, Surface) and self.discretisation == "mortar"
+
+    def _facts(self) -> dict[str, Any]:
+        return facts_of_pair(self)
 
     @property
     def place(self) -> str:
@@ -323,6 +327,7 @@ class ContactPair:
         return _not_negative(f"shear limit of {self.place}", limit, points)
 
 
+@in_notebooks
 @dataclass(frozen=True)
 @checked()
 class Tie:
@@ -359,10 +364,30 @@ class Tie:
         """Facets, as the gap between tied surfaces is not used."""
         return "faceted"
 
+    def _facts(self) -> dict[str, Any]:
+        return facts_of_pair(self)
+
     @property
     def place(self) -> str:
         """Its surfaces: "upper z0 on lower z1"."""
         return place_of(self.slave, self.master)
+
+
+@tabled
+class Pairs(tuple[ContactPair, ...]):
+    """The contact pairs of a scene, which are shown as a table."""
+
+    def _tables(self) -> list[Table]:
+        """Return a table with one line for each pair."""
+        head = ("", "surfaces", "friction", "discretisation")
+        rows = [
+            (
+                f"contact {number}", pair.place, in_short(pair.friction or "none"),
+                pair.reason or pair.discretisation,
+            )
+            for number, pair in enumerate(self)
+        ]  # fmt: skip
+        return [Table([head, *rows], 4)] if rows else []
 
 
 def _check_stiffness(name: str, given: float | None) -> None:
@@ -406,6 +431,13 @@ def _in_words(value: float | OfPosition | str) -> str:
     if callable(value):
         return "by a function"
     return value if isinstance(value, str) else f"{value:g}"
+
+
+def facts_of_pair(pair: ContactPair | Tie) -> dict[str, Any]:
+    """Return what is given of a pair, and its discretisation with the reason of the scene's choice."""
+    given = {each.name: getattr(pair, each.name) for each in fields(pair) if each.repr}
+    given["discretisation"] = pair.reason or pair.discretisation
+    return {name: value for name, value in given.items() if value is not None and value is not False}
 
 
 def place_of(slave: Surface, master: Surface | RigidObstacle) -> str:

@@ -14,7 +14,7 @@ from fenics_contact._scene.automatic import AutomaticContact
 from fenics_contact._scene.constraints import require_terms, with_values
 from fenics_contact._scene.contact_facets import with_free_centres
 from fenics_contact._scene.loads import Load
-from fenics_contact._scene.pairs import ContactPair, with_pressures
+from fenics_contact._scene.pairs import ContactPair, Pairs, with_pressures
 from fenics_contact._scene.parts import SceneParts, with_discretisation
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.sections import changed_by, require_preloads, with_cuts
@@ -80,7 +80,7 @@ class Scene(SceneParts):
         require_terms(self.constraints, self.bodies)
         if any(body.mesh.centres is not None for body in self.bodies.values()):
             object.__setattr__(self, "bodies", with_free_centres(self))
-        object.__setattr__(self, "contacts", with_discretisation(self, self.contacts))
+        object.__setattr__(self, "contacts", Pairs(with_discretisation(self, self.contacts)))
         object.__setattr__(self, "ties", with_discretisation(self, self.ties))
 
     def partition(self, ranks: int = 1, *, lean: bool = False) -> dict[str, np.ndarray]:

@@ -8,11 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from fenics_contact._base.display import displayed
+from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.by_name import ByName, names_of
-from fenics_contact.results.forces import aligned
 
 
 @displayed
@@ -30,7 +29,7 @@ class ConstraintForce:
     on_bodies: Mapping[str, np.ndarray]
 
 
-@displayed
+@tabled
 @dataclass(frozen=True, eq=False)
 class ConstraintForces(ByName[ConstraintForce]):
     """All linear constraints of a scene by their names, in its order; those of the same name are numbered."""
@@ -38,15 +37,15 @@ class ConstraintForces(ByName[ConstraintForce]):
     kind: ClassVar[str] = "constraints"
     entries: Mapping[str, ConstraintForce]
 
-    def __str__(self) -> str:
+    def _tables(self) -> list[Table]:
         """Return a table with one line for each body of each constraint."""
         if not self.entries:
-            return "none"
+            return []
         rows: list[tuple[str, ...]] = [("", "equations", "body", "force")]
         for name, each in self.items():
             for body, total in each.on_bodies.items():
                 rows.append((name, str(len(each.force)), body, f"({', '.join(f'{x:.5g}' for x in total)})"))
-        return "\n".join([*aligned(rows, 3), "in [force]"])
+        return [Table(rows, 3, ("in [force]",))]
 
 
 def constraint_forces(torn: TornSystem, multiplier: np.ndarray) -> ConstraintForces:

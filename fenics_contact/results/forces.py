@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector, unit_vector
-from fenics_contact._base.display import displayed
+from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.foundations import ElasticFoundation
@@ -247,7 +247,7 @@ class Resultant:
         )
 
 
-@displayed
+@tabled
 @dataclass(frozen=True, eq=False)
 class Resultants:
     """Resultants in the order of a list of the scene.
@@ -295,23 +295,24 @@ class Resultants:
         """Return the entries in their order."""
         return iter(self.entries)
 
-    def __str__(self) -> str:
+    def _tables(self) -> list[Table]:
         """Return a table with one line for each entry."""
-        return table([(f"{self.kind} {i}", name) for i, name in enumerate(self._surfaces)], self.entries)
+        return table_of([(f"{self.kind} {i}", name) for i, name in enumerate(self._surfaces)], self.entries)
 
 
-def table(
+def table_of(
     names: list[tuple[str, ...]],
     resultants: tuple[Resultant, ...],
     scales: tuple[float, float] | None = None,
-) -> str:
+    *notes: str,
+) -> list[Table]:
     """Return forces and moments of several resultants, one per line behind its names, with their units.
 
     `scales`: reference force and moment; what is rounding of these is shown as zero; by default the largest
     components.
     """
     if not resultants:
-        return "none"
+        return []
     columns = [
         np.stack([each.force for each in resultants]),
         np.stack([_row(each.moment) for each in resultants]),
@@ -328,19 +329,7 @@ def table(
     if revolved:
         torque = ", T in [force·length]" * np.size(resultants[0].moment)
         units = f"F in [force]{torque} per revolution"
-    return "\n".join([*aligned([head, *cells], len(names[0])), units])
-
-
-def aligned(rows: list[tuple[str, ...]], names: int) -> list[str]:
-    """Return rows of cells as lines, the first ``names`` columns to the left and the others to the right."""
-    width = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            cell.ljust(size) if k < names else cell.rjust(size)
-            for k, (cell, size) in enumerate(zip(row, width, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
+    return [Table([head, *cells], len(names[0]), (units, *notes))]
 
 
 def resultant(
@@ -518,7 +507,7 @@ def centroid(scene: Scene, surface: Surface) -> np.ndarray:
     return surface_moments(mesh.points, mesh.surfaces[surface.name], scene.axisymmetric).centroid
 
 
-@displayed
+@tabled
 @dataclass(frozen=True, eq=False)
 class Balance:
     """Forces and moments on all bodies together, about one point, and what is missing to equilibrium.
@@ -573,13 +562,13 @@ class Balance:
         force, moment = np.linalg.norm(part.force), np.linalg.norm(np.atleast_1d(part.moment))
         return float(max(force / (self.force_scale or 1.0), moment / (self.moment_scale or 1.0)))
 
-    def __str__(self) -> str:
+    def _tables(self) -> list[Table]:
         """Return a table of all parts that are not zero, their total and the imbalance."""
         shown = {name: part for name, part in self.parts.items() if self._relative(part) > ROUNDING}
         shown["total"] = self.total
         scales = self.force_scale, self.moment_scale
-        lines = table([(name,) for name in shown], tuple(shown.values()), scales)
-        return f"{lines}\nimbalance {self.imbalance:.1e}"
+        notes = f"imbalance {self.imbalance:.1e}"
+        return table_of([(name,) for name in shown], tuple(shown.values()), scales, notes)
 
 
 def force_balance(
@@ -645,7 +634,7 @@ def _middle(places: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * (places.min(axis=0) + places.max(axis=0)))
 
 
-@displayed
+@tabled
 @dataclass(frozen=True, eq=False)
 class PairResultants:
     """Forces and moments on the slaves of all pairs.
@@ -660,10 +649,9 @@ class PairResultants:
     friction: Resultants
     ties: Resultants
 
-    def __str__(self) -> str:
+    def _tables(self) -> list[Table]:
         """Return both tables, without that of an empty list."""
-        tables = [str(each) for each in (self.contacts, self.ties) if len(each)]
-        return "\n".join(tables) or "none"
+        return self.contacts._tables() + self.ties._tables()
 
 
 def pair_resultants(

@@ -8,12 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from fenics_contact._base.display import displayed
+from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact.feti.preloads import shortening_columns
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.by_name import ByName, names_of
-from fenics_contact.results.forces import NodalForces, Resultant, aligned, resultant
+from fenics_contact.results.forces import NodalForces, Resultant, resultant
 
 
 @displayed
@@ -57,7 +57,7 @@ class SectionForces:
         return float(moment @ self.normal) if len(moment) == 3 else 0.0
 
 
-@displayed
+@tabled
 @dataclass(frozen=True, eq=False)
 class Preloads(ByName[SectionForces]):
     """What the sections of all preloads transmit, by the names of these, in the scene's order.
@@ -68,10 +68,10 @@ class Preloads(ByName[SectionForces]):
     kind: ClassVar[str] = "preloads"
     entries: Mapping[str, SectionForces]
 
-    def __str__(self) -> str:
+    def _tables(self) -> list[Table]:
         """Return a table with one line for each preload."""
         if not self.entries:
-            return "none"
+            return []
         head = ("", "force", "shortening", "shear", "bending", "torsion")
         size = max(abs(each.force) for each in self.values())
         rows: list[tuple[str, ...]] = [head]
@@ -79,7 +79,7 @@ class Preloads(ByName[SectionForces]):
             numbers = each.force, each.shortening, each.shear, each.bending, each.torsion
             shown = [0.0 if k != 1 and abs(x) <= ROUNDING * size else x for k, x in enumerate(numbers)]
             rows.append((name, *(f"{x:.5g}" for x in shown)))
-        return "\n".join([*aligned(rows, 1), "in [force], [length], [force·length]"])
+        return [Table(rows, 1, ("in [force], [length], [force·length]",))]
 
 
 def shortenings(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:

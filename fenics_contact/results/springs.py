@@ -8,11 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from fenics_contact._base.display import displayed
+from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.by_name import ByName, names_of
-from fenics_contact.results.forces import NodalForces, aligned
+from fenics_contact.results.forces import NodalForces
 
 
 @displayed
@@ -37,7 +37,7 @@ class SpringForce:
         return np.asarray(self.directions @ self.force)
 
 
-@displayed
+@tabled
 @dataclass(frozen=True, eq=False)
 class SpringForces(ByName[SpringForce]):
     """All springs of a scene by their names, in its order; those of the same name are numbered."""
@@ -45,10 +45,10 @@ class SpringForces(ByName[SpringForce]):
     kind: ClassVar[str] = "springs"
     entries: Mapping[str, SpringForce]
 
-    def __str__(self) -> str:
+    def _tables(self) -> list[Table]:
         """Return a table with one line for each direction of each spring."""
         if not self.entries:
-            return "none"
+            return []
         size = max(float(np.abs(each.force).max()) for each in self.values())
         rows: list[tuple[str, ...]] = [("", "along", "tension", "elongation")]
         for name, each in self.items():
@@ -57,7 +57,7 @@ class SpringForces(ByName[SpringForce]):
                 rows.append(
                     (name, along, f"{tension if abs(tension) > ROUNDING * size else 0:.5g}", f"{longer:.5g}")
                 )
-        return "\n".join([*aligned(rows, 2), "in [force], [length]"])
+        return [Table(rows, 2, ("in [force], [length]",))]
 
 
 def spring_forces(torn: TornSystem, forces: NodalForces, multiplier: np.ndarray) -> SpringForces:

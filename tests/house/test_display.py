@@ -76,7 +76,7 @@ from fenics_contact._accuracy.recovery import find_sites
 from fenics_contact._accuracy.state_errors import solver_errors
 from fenics_contact._adaptive.levels import AccurateResult, Level, Limits
 from fenics_contact._adaptive.minimised import AccurateDesign
-from fenics_contact._base.display import COLUMNS, LINES, displayed, in_lines
+from fenics_contact._base.display import COLUMNS, LINES, Table, displayed, in_lines, tabled
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._optimize.problem import pose
 from fenics_contact.design import (
@@ -335,6 +335,66 @@ def test_notebooks_show_a_small_table(name: str) -> None:
     assert table[0].text == name
     assert 5 <= len(rows) <= MOST_PRINTED
     assert all(not DUMPED.search(text or "") for text in rows.values())
+
+
+TABLES = (
+    "AccurateResult",
+    "Balance",
+    "ConstraintForces",
+    "PairResultants",
+    "Preloads",
+    "Resultants",
+    "StateErrors",
+)
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_are_the_same_printed_at_a_prompt_and_in_notebooks(name: str) -> None:
+    shown = objects()[name]
+    page = ET.fromstring(f"<div>{shown._repr_html_()}</div>")
+    printed = str(shown).splitlines()
+    cells = [" ".join(cell.text or "" for cell in row).split() for row in page.iter("tr")]
+    assert len(cells) > 1
+    assert all(words in [line.split() for line in printed] for words in cells)
+    captions = [caption.text or "" for caption in page.iter("caption")]
+    notes = [note for caption in captions for note in caption.split("; ")[1:]]
+    assert len(cells) + len(notes) == len(printed)
+    assert repr(shown).splitlines()[:5] == printed[:5]
+
+
+def test_a_long_table_is_cut_at_a_prompt() -> None:
+    @tabled
+    @dataclass(frozen=True)
+    class Long:
+        rows: int
+
+        def _tables(self) -> list[Table]:
+            return [Table([("", "number"), *((f"<{k}>", str(k)) for k in range(self.rows))], 1)]
+
+    assert len(str(Long(40)).splitlines()) == 41
+    assert len(repr(Long(40)).splitlines()) == LINES
+    assert repr(Long(40)).endswith("… 32 more lines: print it")
+    assert repr(Long(3)) == "     number\n<0>       0\n<1>       1\n<2>       2"
+    assert "&lt;0&gt;" in Long(3)._repr_html_()  # type: ignore[attr-defined]
+
+
+def test_a_pair_is_a_table_of_what_is_given_with_the_reason_of_its_discretisation() -> None:
+    pair = objects()["Scene"].contacts[0]
+    page = ET.fromstring(pair._repr_html_())
+    rows = {row[0].text: row[1].text for row in page.iter("tr")}
+    assert {"slave", "master", "discretisation", "geometry"} <= rows.keys()
+    assert "adjust" not in rows
+    assert rows["discretisation"] == (pair.reason or pair.discretisation)
+
+
+def test_the_pairs_of_a_scene_are_a_table() -> None:
+    pairs = objects()["Scene"].contacts
+    head, first, *_ = str(pairs).splitlines()
+    assert head.split() == ["surfaces", "friction", "discretisation"]
+    assert first.startswith(f"contact 0  {pairs[0].place}")
+    assert pairs[0].reason in first
+    assert len(ET.fromstring(pairs._repr_html_()).findall("tr")) == 1 + len(pairs)
+    assert pairs == tuple(pairs)
 
 
 def test_a_table_escapes_the_names_that_users_choose() -> None:
