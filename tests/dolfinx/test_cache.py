@@ -1,4 +1,4 @@
-"""Killed compilations are done again, and runs at the same time compile a form once."""
+"""Killed compilations and spoilt libraries are done again, and runs at the same time compile a form once."""
 
 from __future__ import annotations
 
@@ -74,6 +74,59 @@ def test_what_a_killed_compiler_left_is_compiled_again(
     caplog.clear()
     compile_volume()
     assert not caplog.text
+
+
+def spoilt(library: Path, way: str) -> None:
+    """Spoil a library; what a process has loaded stays as it is."""
+    content = library.read_bytes()
+    library.unlink()
+    cut = {"empty": b"", "half": content[: len(content) // 2], "end": content[:-1]}
+    library.write_bytes(cut[way])
+
+
+@pytest.mark.parametrize("way", ["empty", "half", "end"])
+def test_a_spoilt_library_is_compiled_again(way: str, cache: Path, caplog: pytest.LogCaptureFixture) -> None:
+    compile_volume()
+    [library] = cache.glob("*.so")
+    whole = library.stat().st_size
+    spoilt(library, way)
+    with caplog.at_level(logging.WARNING):
+        compile_volume()
+    assert ["has a part of its library alone" in record.message for record in caplog.records] == [True]
+    assert "it is compiled again" in caplog.text
+    assert library.stat().st_size == whole
+    assert not list(cache.glob("*.lock"))
+    caplog.clear()
+    compile_volume()
+    assert not caplog.text
+
+
+def test_a_library_that_cannot_be_loaded_is_compiled_again(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """As one of another machine. A process that has loaded a library does not load it again: it is played."""
+    from ffcx.codegeneration import jit
+
+    compile_volume()
+    [library] = cache.glob("*.so")
+    old, lookup, calls = library.stat().st_ino, jit.get_cached_module, []
+
+    def unloadable(*arguments: object) -> object:
+        calls.append(arguments)
+        if len(calls) == 1:
+            raise ImportError("libc.so.6: version GLIBC_3 not found")
+        return lookup(*arguments)
+
+    (cache / "kept").hardlink_to(library)  # so that its number is not given again
+    monkeypatch.setattr(jit, "get_cached_module", unloadable)
+    with caplog.at_level(logging.WARNING):
+        compile_volume()
+    [words] = [record.getMessage() for record in caplog.records]
+    assert (
+        "library that cannot be loaded (libc.so.6: version GLIBC_3 not found); it is compiled again" in words
+    )
+    assert len(calls) == 2
+    assert library.stat().st_ino != old
 
 
 def test_a_form_that_was_compiled_is_not_looked_up_again(cache: Path) -> None:
