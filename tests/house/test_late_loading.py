@@ -13,6 +13,7 @@ import pytest
 
 import fenics_contact
 from fenics_contact._base.form_language import without_setuptools
+from fenics_contact._dolfinx.loading import old
 from tests.conftest import ROOT, launch
 from tests.house.public import rooms
 
@@ -39,6 +40,15 @@ assert state.contact.normal_force.sum() > 0.01
 sys.stdout.write(" ".join(set(sys.modules) - before))
 """
 
+#: What newer libraries load whoever imports them: ufl reads its own metadata, scipy loads numpy.testing.
+LIBRARIES = """
+import sys
+before = set(sys.modules)
+import mpi4py.MPI, ufl, basix, scipy.linalg, scipy.sparse.csgraph, scipy.sparse.linalg, scipy.spatial
+import dolfinx, dolfinx.fem.petsc, dolfinx.io, dolfinx.mesh
+sys.stdout.write(" ".join(set(sys.modules) - before))
+"""
+
 #: Modules that a solution of a linear scene does not need; each takes more than a millisecond.
 NEVER = {
     "IPython", "email", "gmsh", "h5py", "html", "importlib.metadata", "importlib.resources", "matplotlib",
@@ -56,10 +66,12 @@ NOT_OURS = {
 def test_a_linear_scene_loads_what_it_needs(mpirun: Callable[..., str]) -> None:
     loaded = set(mpirun(SOLVING, 1, fresh=True).split())
     assert {"fenics_contact.feti.factor", "dolfinx", "ufl", "scipy.sparse"} <= loaded
-    assert loaded & NEVER == set()
+    # The oldest dolfinx asks setuptools for versions, which the package prevents.
+    theirs = set() if old() else set(mpirun(LIBRARIES, 1, fresh=True).split())
+    assert (loaded - theirs) & NEVER == set()
     assert loaded & {f"fenics_contact.{name}" for name in NOT_OURS} == set()
     # 687 with Python 3.11 and dolfinx 0.5; 925 before names were loaded late.
-    assert len(loaded) < 800
+    assert len(loaded - theirs) < 800
 
 
 def test_a_scene_file_loads_what_it_needs() -> None:
