@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Set up FEniCSx, gmsh and .venv in one of two ways:
-#   packages  Debian 12 or newer (sid too) and Ubuntu 25.04 or newer: the system's own, and .venv on top of its Python.
+#   packages  Debian 12 or newer (sid too) and Ubuntu 25.04 or newer: the system's own, and .venv on top of its Python,
+#             which sees what FEniCSx and gmsh need of the system's Python packages, and nothing else.
 #             Ubuntu 24.04 has no FEniCSx in its archive, only in that of the FEniCS project (ppa:fenics-packages/fenics).
 #   wheel     x86-64 Linux without these or without root: .venv alone, FEniCSx by the wheel of a third party, which is
 #             alpha.
@@ -27,7 +28,9 @@ while [[ ${1-} == --* ]]; do
   esac
   shift
 done
-packages=(python3-dolfinx-real python3-gmsh python3-venv libopenblas0-pthread libegl1 ca-certificates)
+modules=(python3-dolfinx-real python3-gmsh)
+packages=("${modules[@]}" python3-venv libopenblas0-pthread libegl1 ca-certificates)
+compared=(python3-getfem) # what benchmarks compare with, where it is installed
 wheel_packages=(python3-venv python3-dev gcc ca-certificates libegl1 libgl1 libglu1-mesa libxcursor1 libxft2 libxinerama1)
 further=("$@")
 venv=.venv
@@ -147,17 +150,23 @@ announce_wheel() {
 
 # Everything that the content of .venv depends on, its place included: its scripts name it.
 fingerprint() {
-  { echo "$root" $way "$1" "$python"; "$python" --version; cat pyproject.toml "$pins"/*.txt scripts/setup.sh 2>/dev/null || true; } | sha256sum
+  { echo "$root" $way "$1" "$python"; "$python" --version; cat pyproject.toml "$pins"/*.txt scripts/setup.sh scripts/*system_packages.py 2>/dev/null || true; } | sha256sum
 }
 is_ready() { [ "$(cat $venv/.fenics_contact-ready-"$1" 2>/dev/null)" = "$(fingerprint "$1")" ]; }
 
 # A .venv that was begun and not finished, was moved, is of another way or Python, or cannot run pip is built anew.
 venv_is_sound() {
-  local config=$venv/pyvenv.cfg sees=true
-  [ $way = packages ] || sees=false
-  [ ! -e $unfinished ] && grep -qsx "include-system-site-packages = $sees" $config &&
+  local config=$venv/pyvenv.cfg made=packages
+  [ ! -e $from_wheel ] || made=wheel
+  [ ! -e $unfinished ] && [ $made = $way ] && grep -qsx "include-system-site-packages = false" $config &&
     grep -qsx "home = ${python%/*}" $config && grep -qsF " $root/$venv" $config &&
     $venv/bin/python -m pip --version >/dev/null 2>&1
+}
+
+# Of the system's Python packages .venv sees those of FEniCSx and gmsh and what these depend on. One that came since,
+# as with a newer dolfinx, is seen after the next set-up; what pip has installed hides its counterpart.
+link_system_packages() {
+  [ $way = wheel ] || "$python" scripts/link_system_packages.py $venv "${modules[@]}" "${compared[@]}"
 }
 
 pip() {
@@ -172,9 +181,11 @@ build_venv() {
     rm -rf $venv
     mkdir $venv
     touch $unfinished
-    if [ $way = wheel ]; then "$python" -m venv $venv; touch $from_wheel; else "$python" -m venv --system-site-packages $venv; fi
+    "$python" -m venv $venv
+    [ $way = packages ] || touch $from_wheel
   fi
   touch $unfinished
+  link_system_packages
   rm -f $venv/.fenics_contact-ready-*
   say "installing Python packages into $venv"
   if [ -d "$pins" ]; then # all that is needed is listed, so that nothing else can be drawn in
@@ -212,9 +223,12 @@ pins=constraints/python$minor
 if [ -e $unfinished ] || [ ! -x $venv/bin/python ] || ! { is_ready dev || is_ready $tools; }; then
   [ $way = packages ] || announce_wheel
   build_venv
+  link_system_packages
   dolfinx=$(scripts/launch.sh 1 $venv/bin/python -c 'import mpi4py.MPI, dolfinx; print(dolfinx.__version__)') ||
     die "FEniCSx cannot be loaded: see the lines above"
   fingerprint $tools >$venv/.fenics_contact-ready-$tools
   rm -f $unfinished
   say "done: $system_words, Python $minor, dolfinx $dolfinx ($way)"
+else
+  link_system_packages
 fi

@@ -77,6 +77,12 @@ def hidden() -> str:
     config = Path(sys.prefix, "pyvenv.cfg")
     if not config.is_file() or re.search(r"include-system-site-packages\s*=\s*true", config.read_text()):
         return ""
+    links = Path(sys.prefix).with_name(f".system-{Path(sys.prefix).name.lstrip('.')}")
+    if str(links) in sys.path:
+        return (
+            f"The virtual environment {sys.prefix} has links to what FEniCSx needs of the system's packages: "
+            "bring them up to date by scripts/setup.sh, which installs what is missing, too. "
+        )
     return (
         f"The virtual environment {sys.prefix} does not see the packages of the system: make it with "
         "python3 -m venv --system-site-packages, or install there what brings its own. "

@@ -54,6 +54,8 @@ def test_a_name_in_a_docstring_is_not_code() -> None:
 
 #: Ways to start a process, and what frees its environment of the traces of MPI.
 STARTS, FREES = {"run", "Popen", "check_call", "check_output"}, {"clean_environment", "LAUNCH"}
+#: Runs before the package is there, and starts dpkg-query, which knows nothing of MPI.
+SET_UP = [Path("scripts", "link_system_packages.py")]
 
 
 def starts_processes(tree: ast.AST) -> bool:
@@ -70,7 +72,7 @@ def test_whoever_starts_a_process_frees_it_of_mpi() -> None:
     trees = {path: ast.parse(text) for path, text in texts.items() if "subprocess" in text}
     starting = {path: names_used(tree) & FREES for path, tree in trees.items() if starts_processes(tree)}
     assert len(starting) > 10, "hardly any files start processes: nothing was tested"
-    assert [path for path, free in starting.items() if not free] == []
+    assert [path for path, free in starting.items() if not free] == SET_UP
     assert [path for path, free in starting.items() if "tests" not in path.parts and free == {"LAUNCH"}] == []
 
 

@@ -279,6 +279,10 @@ def test_a_virtual_environment_that_hides_the_system_is_named(
     (tmp_path / "pyvenv.cfg").write_text("include-system-site-packages = false\n")
     with pytest.raises(MissingRequirementError, match=r"does not see the packages .* --system-site-packages"):
         _requirements.check()
+    with monkeypatch.context() as linked:
+        linked.setattr(sys, "path", [*sys.path, str(tmp_path.with_name(f".system-{tmp_path.name}"))])
+        with pytest.raises(MissingRequirementError, match=r"has links to .* up to date by scripts/setup\.sh"):
+            _requirements.check()
     (tmp_path / "pyvenv.cfg").write_text("include-system-site-packages = true\n")
     with pytest.raises(MissingRequirementError, match=r"found none\. Debian"):
         _requirements.check()
