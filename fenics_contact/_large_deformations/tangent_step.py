@@ -11,6 +11,7 @@ exact for any columns. Without stress S = 0, and it is the usual problem with it
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,6 +20,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns
 from fenics_contact._large_deformations.moving_contact import FurtherRows
 from fenics_contact._large_deformations.tangent import TangentSystem
+from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_newton import FaceNewton
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, growing_basis
@@ -27,6 +29,24 @@ from fenics_contact.qp.problem import CountedOperator, DualProblem, FacePrecondi
 from fenics_contact.qp.reductions import Vector, global_sum
 from fenics_contact.qp.solution import apply_unless_zero
 from fenics_contact.qp.solve import solve
+
+
+class Resisted(Protocol):
+    """How the motions of all subdomains follow from those that the rows of a face resist."""
+
+    def motions(self, change: Vector, resisted: Vector) -> Vector:
+        """Return β by δλ, owned, and the motions that rows resist, replicated. Collective."""
+
+
+@dataclass(frozen=True)
+class _EveryMotion:
+    """Rows resist every motion."""
+
+    def motions(self, change: Vector, resisted: Vector) -> Vector:
+        return resisted
+
+
+EVERY_MOTION: Resisted = _EveryMotion()
 
 
 @displayed
@@ -42,6 +62,7 @@ class TangentProblem:
         residual: c − B u, owned: the residual r of the natural map, gaps and minus the slip.
         further: The last rows, for the stiffness of forces that turn.
         flexibility: A typical entry of F, [length / force].
+        resisted: How all motions follow from those of this problem.
     """
 
     problem: DualProblem
@@ -50,6 +71,7 @@ class TangentProblem:
     residual: Vector
     further: FurtherRows
     flexibility: float
+    resisted: Resisted = EVERY_MOTION
 
     @property
     def compliance(self) -> Vector:
@@ -75,6 +97,58 @@ class TangentProblem:
             residual=np.asarray(self.residual * s, dtype=np.float64),
             further=self.further.scaled(s),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _StiffAlone:
+    """The motions N that no row of a face resists, (G Z)ᵀN = 0, follow the others, Q b, by their stiffness.
+
+    By NᵀSβ = Nᵀ(e − G δλ) with β = Q b + N γ. So b are the motions of a problem with Eᵀ G, Eᵀ S Q and Eᵀ e,
+    Eᵀ = Qᵀ(I − S N (NᵀSN)⁻¹Nᵀ). The columns of motions that stress has softened may be more than the rows.
+
+    Attributes:
+        whole: The problem of all motions.
+        kept: Q, orthonormal, shape (m, m - k).
+        alone: N, shape (m, k).
+        flexibility: (NᵀSN)⁻¹, shape (k, k).
+    """
+
+    whole: TangentProblem
+    kept: Vector
+    alone: Vector
+    flexibility: Vector
+
+    @classmethod
+    def of(cls, at: TangentProblem, columns: sp.csr_matrix, soft: float = 1e-8) -> _StiffAlone | None:
+        """Return those of a face; None where some have no stiffness either, or there are none. Collective.
+
+        `columns`: of rows and multipliers of the face, shape (n_owned, n); `soft`: stiffness that is none,
+        relative to the typical one.
+        """
+        coarse = at.problem.coarse
+        null = coarse.comm.bcast(coarse.restricted(columns).gram.null_space)
+        basis, _ = np.linalg.qr(null, mode="complete")
+        alone, kept = basis[:, : null.shape[1]], basis[:, null.shape[1] :]
+        stiffness = alone.T @ (at.stiffness @ alone)
+        sizes = np.linalg.svd(stiffness, compute_uv=False)
+        if not alone.size or not sizes.min() * at.flexibility > soft:
+            return None
+        return cls(at, kept, alone, np.linalg.inv(stiffness))
+
+    @property
+    def problem(self) -> TangentProblem:
+        """The problem of the motions that rows resist."""
+        at, coarse = self.whole, self.whole.problem.coarse
+        passed = (at.stiffness @ self.alone) @ self.flexibility @ self.alone.T
+        onto = self.kept.T - self.kept.T @ passed
+        fewer = CoarseSpace(coarse.comm, sp.csr_matrix(onto) @ coarse.matrix, onto @ coarse.load)
+        stiffness = sp.csr_matrix(onto @ (at.stiffness @ self.kept))
+        return replace(at, problem=replace(at.problem, coarse=fewer), stiffness=stiffness, resisted=self)
+
+    def motions(self, change: Vector, resisted: Vector) -> Vector:
+        at, given = self.whole, self.kept @ resisted
+        missing = at.problem.coarse.load - at.problem.coarse.apply(change) - at.stiffness @ given
+        return np.asarray(given + self.alone @ (self.flexibility @ (self.alone.T @ missing)))
 
 
 @displayed
@@ -117,10 +191,11 @@ def tangent_step(
     face = classify(problem.layout, bound, at.multiplier, at.residual, ratio, problem.compliance)
     operator = CountedOperator(problem.operator)
     moving, fixed = growing_basis(problem.comm, face, problem.law.growth(at.multiplier), at.multiplier)
-    solved = _StiffFace.build(at, face, face.restriction if moving is None else moving, operator)
+    solved = _StiffFace.held(at, face, face.restriction if moving is None else moving, operator)
     if solved is None:
         return None
     change, motions, stop = solved.solve(fixed, forcing, floor, max_products)
+    motions = solved.at.resisted.motions(change, motions)
     multiplier = at.multiplier + change
     if factor is not None:
         multiplier = multiplier * factor
@@ -167,14 +242,15 @@ def tangent_adjoint(
     at = replace(tangent, problem=problem, multiplier=nothing, residual=nothing).scaled()
     operator = CountedOperator(at.problem.operator)
     face, moving = face.scaled(factor * np.ones_like(nothing)), (face.restriction + coupling).tocsr()
-    solved = _StiffFace.build(at, face.homogeneous, moving, operator)
+    solved = _StiffFace.held(at, face.homogeneous, moving, operator)
     if solved is None:
         return None
-    transposed = solved.coupled.transposed(at.problem.coarse)
+    transposed = solved.coupled.transposed(solved.at.problem.coarse)
     if transposed is None:
         return None
     swapped = replace(solved, coupled=transposed)
     change, motions, stop = swapped.solve(nothing, tolerance, 0.0, max_products)
+    motions = solved.at.resisted.motions(change, motions)
     return TangentStep(change * factor, motions, face, operator.products, stop)
 
 
@@ -193,10 +269,22 @@ class _StiffFace:
     soft: np.ndarray  # marks of the columns with a compliance of their own, shape (n,)
 
     @classmethod
+    def held(
+        cls, at: TangentProblem, face: Face, moving: sp.csr_matrix, operator: CountedOperator
+    ) -> _StiffFace | None:
+        """Prepare the face; None where neither it nor their stiffness holds every motion. Collective."""
+        found = cls.build(at, face, moving, operator)
+        if found is not None:
+            return found
+        columns = sp.hstack([at.corrected(face.restriction), moving], format="csr")
+        alone = _StiffAlone.of(at, columns)
+        return None if alone is None else cls.build(alone.problem, face, moving, operator)
+
+    @classmethod
     def build(
         cls, at: TangentProblem, face: Face, moving: sp.csr_matrix, operator: CountedOperator
     ) -> _StiffFace | None:
-        """Prepare the face; None where it does not hold every body. Collective."""
+        """Prepare the face; None where its rows do not resist every motion. Collective."""
         problem, further, equality = at.problem, at.further, at.problem.layout.equality
         basis = face.restriction
         measuring, acting, correcting = (
