@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from ufl.core.expr import Expr
 
-from fenics_contact._base.checks import checked, naming_arguments, require_file
+from fenics_contact._base.checks import LARGEST, checked, naming_arguments, require_file
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
@@ -107,12 +107,12 @@ def checked_scalar(name: str, value: Any) -> Any:
 
 
 def finite_numbers(value: Any) -> np.ndarray | None:
-    """Return a value as an array of floats, None if it is something other than finite numbers."""
+    """Return a value as an array of floats, None if it is something other than numbers below 1e60."""
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         return None
-    return array if np.isfinite(array).all() else None
+    return array if (np.abs(array) < LARGEST).all() else None
 
 
 def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

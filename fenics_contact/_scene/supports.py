@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
+from fenics_contact._base.checks import LARGEST, GivenVector, checked, floats, unit_vector
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact.errors import InvalidInputError
@@ -65,7 +65,7 @@ class Support:
         """Reject a support that prescribes nothing or something other than a number."""
         given = [component for component in self.value if component is not None]
         numbers = [component for component in given if not callable(component)]
-        if len(self.value) not in (2, 3) or not given or not np.all(np.isfinite(numbers)):
+        if len(self.value) not in (2, 3) or not given or not np.all(np.abs(numbers) < LARGEST):
             raise InvalidInputError(
                 "Support.value must hold three entries (two for a plane body), each a finite number, a "
                 f"function of the points or None, and at least one that is not None, got {self.value!r}: use "

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from fenics_contact._base.checks import checked
+from fenics_contact._base.checks import LARGEST, checked
 from fenics_contact._base.display import counted, displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.shapes.simple import outer
@@ -256,6 +256,11 @@ class Triangulation:
 
     def _require_closed(self) -> None:
         """Reject edges of other than two triangles, and neighbours of opposite orientation."""
+        if not len(self.triangles):
+            raise InvalidInputError(
+                "Triangulation needs triangles with three different corners, those given have none after "
+                "points within a millionth of its size are joined: correct the coordinates"
+            )
         edges = self.triangles[:, SIDES].reshape(-1, 2)
         low, high = edges.min(axis=1), edges.max(axis=1)
         _, number, count = np.unique(low * len(self.points) + high, return_inverse=True, return_counts=True)
@@ -300,7 +305,7 @@ def _arrays(points: Any, triangles: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return points and triangles as arrays; reject others."""
     try:
         places, corners = np.array(points, dtype=np.float64), np.array(triangles, dtype=np.int64)
-        fits = places.ndim == 2 and places.shape[1] == 3 and bool(np.isfinite(places).all())
+        fits = places.ndim == 2 and places.shape[1] == 3 and bool((np.abs(places) < LARGEST).all())
         fits = fits and corners.ndim == 2 and corners.shape[1] == 3 and len(corners) >= 4
         fits = fits and corners.min() >= 0 and corners.max() < len(places)
     except (TypeError, ValueError):

@@ -44,3 +44,18 @@ def test_files_without_a_body_are_refused(tmp_path: Path, cells: list, scale: fl
     meshio.write_points_cells(tmp_path / "tool.vtu", CUBE, cells)
     with pytest.raises(InvalidInputError, match=message):
         read_triangulation(tmp_path / "tool.vtu", scale=scale)
+
+
+@pytest.mark.parametrize(
+    ("far", "message"),
+    [
+        (1e200, r"Triangulation needs finite points of shape \(n, 3\)"),
+        (1e12, r"three different corners, those given have none after points within a millionth"),
+    ],
+)
+def test_points_that_are_too_far_away_are_refused(tmp_path: Path, far: float, message: str) -> None:
+    points = np.vstack([CUBE, [[far, 0.0, 0.0]]])
+    wild = np.concatenate([SIDES, [[0, 8, 8]]])
+    meshio.write_points_cells(tmp_path / "tool.vtu", points, [("triangle", wild)])
+    with pytest.raises(InvalidInputError, match=message):
+        read_triangulation(tmp_path / "tool.vtu")
