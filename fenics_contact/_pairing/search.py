@@ -44,7 +44,7 @@ from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
-from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.parts import as_mortar_slave, surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.thickness import thickness_on
@@ -260,11 +260,12 @@ class MortarPoints:
         `bearing`: which slave nodes may carry one, shape (n_nodes,); `comm`: communicator of the ranks that
         share the work; this one by default; `movable`: which of them supports leave free, by default those.
         """
+        from fenics_contact._pairing.mortar.by_master import with_inclined
         from fenics_contact._pairing.mortar.coupling import mortar_coupling
         from fenics_contact._pairing.mortar.gathering import Gathering
 
         comm = comm or MPI.COMM_SELF
-        coupling = mortar_coupling(slave, master, comm)
+        slave, coupling = with_inclined(slave, master, mortar_coupling(slave, master, comm))
         gathering = Gathering.of(coupling, slave, bearing if movable is None else movable)
         if gathering is not None:
             coupling = gathering.coupling(slave, master)
@@ -306,17 +307,19 @@ class MortarPoints:
         self, by: CouplingDerivatives, comm: MPI.Comm | None = None
     ) -> tuple[SurfaceDerivatives, SurfaceDerivatives]:
         """Vector-Jacobian product of the coupling by slave and master. Collective on ``comm``."""
+        from fenics_contact._pairing.mortar.by_master import NormalsPulledBack
         from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back
 
         slave, master, coupling, gathering = self.slave, self.master, self.coupling, self.gathering
         if gathering is None:
             return mortar_pulled_back(slave, master, coupling, by, comm)
+        turned = NormalsPulledBack.of(slave, master, coupling, by)
         whole, places = gathering.whole, (slave.points, master.points)
-        by_whole = gathering.pulled_back(coupling, by, places)
+        by_whole = gathering.pulled_back(coupling, turned.with_weights(by, master), places)
         by_slave, by_master = mortar_pulled_back(slave, master, whole, by_whole, comm)
         along = by.gap[:, None] * coupling.normal
-        apart = coupling.of_slave(slave.points) - coupling.weight @ master.points + coupling.relief
-        by_slave.normals[coupling.node] -= by.normal + by.gap[:, None] * apart
+        by_slave.normals[coupling.node] += turned.slave
+        by_master.normals[:] += turned.master
         by_slave.points[:] += coupling.of_slave_pulled_back(along, len(slave.nodes))
         by_master.points[:] -= coupling.weight.T @ along
         return by_slave, by_master
@@ -447,7 +450,7 @@ def _measured(
     geometry = pair.slave_geometry if isinstance(pair, ContactPair) else pair.geometry
     slave = _Side.of(scene, pair.slave, geometry, numbers, finer and not alone)
     if pair.discretisation == "mortar":
-        slave = replace(slave, surface=slave.surface.with_areas_of_pieces())
+        slave = replace(slave, surface=as_mortar_slave(scene, pair.slave, slave.surface))
     movable = ~fixed[slave.nodes].all(axis=1)
     if isinstance(pair, CyclicSymmetry):
         axial = pair.axial_nodes(scene.bodies[pair.slave.body].mesh, pair.slave.name)

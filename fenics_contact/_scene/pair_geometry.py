@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.sparse import LAST_PLACES
+from fenics_contact._scene.discretisation import in_words
 from fenics_contact._scene.loads import (
     BodyForce,
     InitialStress,
@@ -23,7 +24,7 @@ from fenics_contact._scene.loads import (
 )
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
-from fenics_contact._scene.parts import in_words, surface_of
+from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.rollers import direction_of
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import RigidSurface, Roller, ToolMotion

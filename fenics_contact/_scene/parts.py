@@ -1,12 +1,11 @@
-"""The parts of a scene, checks that they fit together, and surfaces and discretisation of its pairs."""
+"""The parts of a scene, checks that they fit together, and surfaces of its pairs."""
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Self, TypeVar
-from weakref import WeakKeyDictionary
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from fenics_contact._scene.loads import (
 )
 from fenics_contact._scene.local_axes import HeldDirections, LocalAxes, held_along, same_axes
 from fenics_contact._scene.obstacles import RigidObstacle
-from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, pressures_of
+from fenics_contact._scene.pairs import ContactPair, Surface, pressures_of
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.revolution import hold_axis, require_all_or_none, require_simple_torsion, twisting
 from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, require_direction
@@ -38,8 +37,8 @@ from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Sup
 from fenics_contact._scene.thickness import require_thickness
 from fenics_contact._scene.tools import ToolBody, bodies_with_tools, with_motions
 from fenics_contact._scene.touching import check_touching
-from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
-from fenics_contact._surfaces.projection import surfaces_match
+from fenics_contact._surfaces.corners import sharp_nodes
+from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.true_surface import Geometry, true_surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import Material, can_expand
@@ -520,86 +519,6 @@ def _require_different(pairs: Sequence[ContactPair | AnyTie]) -> None:
                 )
 
 
-#: Why every contact with an obstacle is by nodes.
-RIGID = "as the master is rigid"
-#: Reason of a choice that other meshes do not change.
-REMESHED = "as on the meshes before the last one"
-
-Pair = TypeVar("Pair", bound=ContactPair | AnyTie)
-AnyScene = TypeVar("AnyScene", bound="SceneParts")
-
-_KNOWN: WeakKeyDictionary[BodyMesh, WeakKeyDictionary[BodyMesh, dict[tuple[str, str], bool]]] = (
-    WeakKeyDictionary()
-)
-"""Whether surfaces of two meshes match, shared with reshaped meshes."""
-
-
-def with_discretisation(scene: SceneParts, pairs: Sequence[Pair]) -> tuple[Pair, ...]:
-    """Return pairs with the discretisation that they were given, or with the better one of the scene.
-
-    It is that of the undeformed meshes before any design moved them, the same for all loads.
-    """
-    return tuple(_with_choice(scene, pair) for pair in pairs)
-
-
-def keeping_discretisation(scene: AnyScene) -> AnyScene:
-    """Return the scene with choices that stay when its bodies get other meshes."""
-    return replace(scene, contacts=[*map(_kept, scene.contacts)], ties=[*map(_kept, scene.ties)])
-
-
-def in_words(pair: ContactPair | AnyTie) -> str:
-    """Return the discretisation of a pair and, where the scene chose it, why."""
-    if not isinstance(pair.master, Surface):
-        return f"node, {RIGID}"
-    return pair.reason or pair.discretisation
-
-
-def _with_choice(scene: SceneParts, pair: Pair) -> Pair:
-    chosen = pair.discretisation == "best" or bool(pair.reason)
-    if not chosen or pair.reason.endswith(REMESHED):
-        return pair
-    found, why = _choice(scene, pair)
-    reason = f"{found}, {why}"
-    return pair if pair.reason == reason else replace(pair, discretisation=found, reason=reason)
-
-
-def _kept(pair: Pair) -> Pair:
-    """Return a pair whose choice does not depend on meshes any more."""
-    return replace(pair, reason=f"{pair.discretisation}, {REMESHED}") if pair.reason else pair
-
-
-def _choice(scene: SceneParts, pair: ContactPair | AnyTie) -> tuple[Discretisation, str]:
-    """Return the better discretisation of a pair, and why."""
-    if not isinstance(pair.master, Surface):
-        return "node", RIGID
-    if isinstance(pair, ContactPair) and pair.within_body:
-        return "node", "as the body meets itself"
-    if isinstance(pair, ContactPair) and pair.nodes is not None:
-        return "node", f"as the nodes of {pair.nodes!r} touch"
-    sides = pair.slave, pair.master
-    slave, master = (scene.bodies[side.body].mesh.origin for side in sides)
-    known = _KNOWN.setdefault(slave, WeakKeyDictionary()).setdefault(master, {})
-    names = pair.slave.name, pair.master.name
-    if isinstance(pair, CyclicSymmetry):
-        match = _sides_match(scene, pair, slave, master)
-        return ("node", "as the meshes match") if match else ("mortar", "as the meshes do not match")
-    if names not in known:
-        alike = slave.order == master.order
-        known[names] = alike and surfaces_match(*map(_faceted, (slave, master), names))
-    return ("node", "as the meshes match") if known[names] else ("mortar", "as the meshes do not match")
-
-
-def _sides_match(scene: SceneParts, sector: CyclicSymmetry, slave: BodyMesh, master: BodyMesh) -> bool:
-    """Return whether the meshes of both sides of a sector do."""
-    turned = sector.turned(master.points, scene.sector_angle(sector))
-    facets = slave.linear.surfaces[sector.slave.name], master.linear.surfaces[sector.master.name]
-    return surfaces_match(faceted_surface(slave.points, facets[0]), faceted_surface(turned, facets[1]))
-
-
-def _faceted(mesh: BodyMesh, surface: str) -> FacetedSurface:
-    return faceted_surface(mesh.points, mesh.linear.surfaces[surface])
-
-
 #: Directions are the same if the cosine of the angle between them differs from one by no more than this.
 TILT = 1e-9
 
@@ -681,7 +600,16 @@ def surface_of(
 def slave_of(scene: SceneParts, pair: ContactPair | AnyTie, geometry: Geometry) -> FacetedSurface:
     """Return the slave of a pair, as `surface_of`; by mortar with the areas of the pieces of its facets."""
     surface = surface_of(scene, pair.slave, geometry)
-    return surface.with_areas_of_pieces() if pair.discretisation == "mortar" else surface
+    return as_mortar_slave(scene, pair.slave, surface) if pair.discretisation == "mortar" else surface
+
+
+def as_mortar_slave(scene: SceneParts, side: Surface, surface: FacetedSurface) -> FacetedSurface:
+    """Return a named surface as the slave of mortar contact: with areas of pieces, and its sharp nodes."""
+    mesh = scene.bodies[side.body].mesh
+    cuts = mirrored(scene, side.body)
+    for neighbour in _neighbours(scene, side.body):
+        cuts = np.column_stack([cuts, np.isin(np.arange(mesh.n_nodes), neighbour.here)])
+    return replace(surface.with_areas_of_pieces(), sharp=sharp_nodes(mesh, side.name, cuts))
 
 
 def _neighbours(scene: SceneParts, body: str) -> tuple[Neighbour, ...]:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact._base.display import counted, displayed
+from fenics_contact._scene.discretisation import in_words
 from fenics_contact._scene.loads import BodyForce, PointForce, ThermalStrain
 from fenics_contact._scene.memory import Subdomains, expected_memory
 from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tresca
-from fenics_contact._scene.parts import in_words
 from fenics_contact._scene.supports import RigidSurface, Roller
 from fenics_contact._scene.tools import ToolBody, with_tool_parts
 from fenics_contact._surfaces.facets import has_midside_pressure

@@ -13,9 +13,10 @@ from fenics_contact._base.display import displayed
 from fenics_contact._scene.automatic import AutomaticContact
 from fenics_contact._scene.constraints import require_terms, with_values
 from fenics_contact._scene.contact_facets import with_free_centres
+from fenics_contact._scene.discretisation import with_discretisation
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.pairs import ContactPair, Pairs, with_pressures
-from fenics_contact._scene.parts import SceneParts, with_discretisation
+from fenics_contact._scene.parts import SceneParts
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.sections import changed_by, require_preloads, with_cuts
 from fenics_contact._scene.supports import AnySupport

@@ -362,6 +362,8 @@ class FacetedSurface:
             positive, as of slaves of mortar contact.
         mixed: How these facets, all triangles, are pieces of triangles and quadrilaterals; None where all
             are alike.
+        sharp: Which nodes lie on corners or edges of the body, shape (n,), of slaves of mortar contact; None:
+            none does.
     """
 
     nodes: np.ndarray
@@ -377,6 +379,7 @@ class FacetedSurface:
     followed: sp.csr_matrix | None = None
     by_pieces: bool = False
     mixed: MixedPieces | None = None
+    sharp: np.ndarray | None = None
 
     def within(self, vectors: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
         """Return vectors without their components across planes of symmetry, both (n, dim), (n, n_planes)."""

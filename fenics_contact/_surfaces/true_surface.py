@@ -96,7 +96,7 @@ def without_folds(surface: FacetedSurface) -> FacetedSurface:
 
 
 @dataclass(frozen=True)
-class _Joints:
+class Joints:
     """Edges between two facets, in the plane the nodes between two edges.
 
     Attributes:
@@ -141,11 +141,9 @@ class Wedges:
 
 def wedges_of(surface: FacetedSurface) -> Wedges:
     """Group the corners of facets."""
-    joints, images = _joints(surface), _joints_with_images(surface)
-    every = _Joints(
-        *(np.concatenate([getattr(p, name) for p in (joints, *images)]) for name in _Joints.NAMES)
-    )
-    smooth = ~_is_crease(surface, every)
+    joints, images = joints_of(surface), _joints_with_images(surface)
+    every = Joints(*(np.concatenate([getattr(p, name) for p in (joints, *images)]) for name in Joints.NAMES))
+    smooth = ~is_crease(surface, every)
     one, other = (every.corners[smooth, side].ravel() for side in (0, 1))
     count = surface.facets.size
     graph = sp.coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
@@ -165,7 +163,7 @@ def wedges_of(surface: FacetedSurface) -> Wedges:
     return Wedges(wedge.reshape(surface.facets.shape), node, mirrored, rim)
 
 
-def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
+def _joints_with_images(surface: FacetedSurface) -> list[Joints]:
     """Return the joints of a surface with its mirror images across each plane of symmetry."""
     count, corners = surface.facets.shape
     corner, joints = np.arange(count * corners).reshape(count, corners), []
@@ -181,12 +179,12 @@ def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
         if corners > 2:
             ends = np.column_stack([ends, corner[facet, (place + 1) % corners]])
         angle = 2 * np.arcsin(np.minimum(np.abs(unit[facet] @ plane), 1.0))
-        joints.append(_Joints(np.stack([facet, facet], 1), np.stack([ends, ends], 1), angle))
+        joints.append(Joints(np.stack([facet, facet], 1), np.stack([ends, ends], 1), angle))
     return joints
 
 
-def _is_crease(
-    surface: FacetedSurface, joints: _Joints, rounding: float = 1e-6, parallel: float = 0.9
+def is_crease(
+    surface: FacetedSurface, joints: Joints, rounding: float = 1e-6, parallel: float = 0.9
 ) -> np.ndarray:
     """Return which joints are creases.
 
@@ -223,7 +221,7 @@ def _is_crease(
     return np.asarray(alone | (joints.angle > np.radians(CREASE)))
 
 
-def _joints(surface: FacetedSurface) -> _Joints:
+def joints_of(surface: FacetedSurface) -> Joints:
     """Return the joints of a surface."""
     count, corners = surface.facets.shape
     corner = np.arange(count * corners).reshape(count, corners)
@@ -242,7 +240,7 @@ def _joints(surface: FacetedSurface) -> _Joints:
     summed = corner_products(surface.points, surface.facets).sum(axis=1)
     one, other = (summed[facets[:, side]] for side in (0, 1))
     across = np.linalg.norm(_crossed(one, other), axis=1)
-    return _Joints(facets, ends, np.arctan2(across, np.einsum("nd,nd->n", one, other)))
+    return Joints(facets, ends, np.arctan2(across, np.einsum("nd,nd->n", one, other)))
 
 
 def _matches(keys: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
+from fenics_contact._scene.discretisation import keeping_discretisation
 from fenics_contact._scene.pairs import Surface
-from fenics_contact._scene.parts import keeping_discretisation
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import shape_functions
 from fenics_contact._surfaces.projection import project

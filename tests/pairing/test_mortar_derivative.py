@@ -19,7 +19,10 @@ from fenics_contact._surfaces.true_surface import reconstructed
 from tests.pairing.mortar_surfaces import CURVED, KINDS, lattice, plate, shell
 
 STEP = 1e-7
-TOLERANCE = {"plates": 1e-7, "shells": 1e-7, "matching": 1e-6, "nested": 1e-6}
+TOLERANCE = {
+    "plates": 1e-7, "shells": 1e-7, "sharp plates": 1e-6, "sharp shells": 1e-7, "matching": 1e-6,
+    "nested": 1e-6,
+}  # fmt: skip
 TERMS = ("area", "weight", "normal", "gap")
 
 
@@ -31,7 +34,8 @@ def warped(surface: FacetedSurface, size: float, seed: int) -> FacetedSurface:
 
 def placed(surface: FacetedSurface, points: np.ndarray) -> FacetedSurface:
     """A surface with its nodes elsewhere, without what lay over it."""
-    plain = replace(faceted_surface(points, surface.facets, surface.mirrored), whole=surface.whole)
+    plain = faceted_surface(points, surface.facets, surface.mirrored)
+    plain = replace(plain, whole=surface.whole, sharp=surface.sharp)
     return plain.with_areas_of_pieces()
 
 
@@ -47,6 +51,18 @@ def shells(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
     slave = shell(kinds[0], 6, 1.0, convex=True, span=(0.3, 1.5))
     master = shell(kinds[1], 8, 1.05, convex=False, span=(0.6, 2.0), uneven=-0.2)
     return reconstructed(warped(slave, 0.004, 1)), reconstructed(warped(master, 0.004, 2))
+
+
+def sharp_plates(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
+    """The plates, with the master's normals at each second node of the slave."""
+    slave, master = plates(kinds)
+    return replace(slave, sharp=np.arange(len(slave.nodes)) % 2 == 0), master
+
+
+def sharp_shells(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
+    """The shells, likewise."""
+    slave, master = shells(kinds)
+    return replace(slave, sharp=np.arange(len(slave.nodes)) % 2 == 0), master
 
 
 def matching(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
@@ -72,6 +88,8 @@ def regular(
 PAIRS: dict[str, Callable[[tuple[str, str]], tuple[FacetedSurface, FacetedSurface]]] = {
     "plates": plates,
     "shells": shells,
+    "sharp plates": sharp_plates,
+    "sharp shells": sharp_shells,
     "matching": matching,
     "nested": nested,
 }
@@ -169,7 +187,7 @@ def test_each_term_agrees_with_central_differences(
 @pytest.mark.parametrize("which", ["slave", "master"])
 @pytest.mark.parametrize("term", TERMS)
 @pytest.mark.parametrize("kinds", CURVED, ids="-".join)
-@pytest.mark.parametrize("name", ["plates", "shells"])
+@pytest.mark.parametrize("name", ["plates", "shells", "sharp plates", "sharp shells"])
 def test_each_term_agrees_with_central_differences_on_quadratic_facets(
     name: str, kinds: tuple[str, str], term: str, which: str
 ) -> None:

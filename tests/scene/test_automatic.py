@@ -24,7 +24,7 @@ from fenics_contact import (
     Tie,
     solve_scene,
 )
-from fenics_contact._scene.parts import keeping_discretisation
+from fenics_contact._scene.discretisation import keeping_discretisation
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, half_disc, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain

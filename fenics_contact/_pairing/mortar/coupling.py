@@ -31,6 +31,7 @@ from scipy import sparse
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.mortar.cells import Cells, candidate_pairs, cells_of, overlaps_of
+from fenics_contact._pairing.mortar.normals import normals_at
 from fenics_contact._pairing.mortar.planes import SumsBy, check_convex, planes_of
 from fenics_contact._pairing.mortar.traces import Traces, trace_functions, trace_nodes
 from fenics_contact._surfaces.facets import FacetedSurface, heights
@@ -250,7 +251,8 @@ class MortarCoupling:
             in plane problems [length]; of bodies of revolution all integrals go around the axis.
         weight: M_ij / D_i with M_ij = ∫ ψ_i N_j, N_j of the master, shape (n, len(master.nodes)); rows add up
             to one.
-        normal: Unit normal from master to slave, the averaged slave normal reversed, shape (n, dim).
+        normal: Unit normal from master to slave, the averaged slave normal reversed, at corners of the slave
+            that of the master, see `normals`, shape (n, dim).
         relief: Weighted mean height of the true surfaces over their facets, slave less master, along the
             slave facets' normals, shape (n, dim), [length].
         gap: n_i · (x_i − Σ_j weight_ij x_j + relief_i), positive when open, shape (n,), [length].
@@ -338,7 +340,7 @@ def _coupling(
     """
     node = np.flatnonzero(area > least_share * slave.areas)
     weight, own = _scaled(integrals[node]), None if slave.whole is None else _scaled(means[node])
-    normal = -slave.normals[node]
+    normal = normals_at(slave, master, node, weight)
     raised = relief[node] / area[node, None]
     coupling = MortarCoupling(node, area[node], weight, normal, raised, np.zeros(len(node)), own)
     apart = coupling.of_slave(slave.points) - weight @ master.points + raised

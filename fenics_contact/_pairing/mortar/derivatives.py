@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.mortar.by_master import NormalsPulledBack
 from fenics_contact._pairing.mortar.cells import (
     CellDerivatives,
     Cells,
@@ -254,7 +255,8 @@ def mortar_pulled_back(
     """
     comm = comm or MPI.COMM_SELF
     into = SurfaceDerivatives.zero(slave), SurfaceDerivatives.zero(master)
-    sums = _sums_pulled_back(slave, master, coupling, by)
+    turned = NormalsPulledBack.of(slave, master, coupling, by)
+    sums = _sums_pulled_back(slave, master, coupling, turned.with_weights(by, master))
     touched = np.flatnonzero(sums.felt[slave.facets].any(axis=1))
     part = touched[comm.rank :: comm.size]
     with together(comm):
@@ -262,8 +264,8 @@ def mortar_pulled_back(
             _add_integrals(slave, moved_aside(master), part, sums, into)
     by_slave, by_master = (side.summed(comm) for side in into)
     along = by.gap[:, None] * coupling.normal
-    apart = coupling.of_slave(slave.points) - coupling.weight @ master.points + coupling.relief
-    by_slave.normals[coupling.node] -= by.normal + by.gap[:, None] * apart
+    by_slave.normals[coupling.node] += turned.slave
+    by_master.normals[:] += turned.master
     by_slave.points[:] += coupling.of_slave_pulled_back(along, len(slave.nodes))
     by_master.points[:] -= coupling.weight.T @ along
     return by_slave, by_master

@@ -21,6 +21,7 @@ import scipy.sparse as sp
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar.coupling import MortarCoupling
+from fenics_contact._pairing.mortar.normals import normals_at
 from fenics_contact._surfaces.facets import FacetedSurface
 
 
@@ -89,7 +90,7 @@ class Gathering:
         node = whole.node[self.point]
         weight, relief = (self.own @ whole.weight).tocsr(), self.own @ whole.relief
         weight.sort_indices()
-        normal, own = -slave.normals[node], self._own_means(len(slave.nodes))
+        normal, own = normals_at(slave, master, node, weight), self._own_means(len(slave.nodes))
         gap = np.einsum("nd,nd->n", normal, own @ slave.points - weight @ master.points + relief)
         return MortarCoupling(node, self.part @ whole.area, weight, normal, relief, gap, own)
 

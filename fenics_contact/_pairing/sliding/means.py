@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +13,12 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
-from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back, weight_derivatives
+from fenics_contact._pairing.mortar.derivatives import (
+    WeightDerivatives,
+    mortar_pulled_back,
+    weight_derivatives,
+)
+from fenics_contact._pairing.mortar.normals import MasterNormals
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._pairing.sliding.closest import moved_surface, summed_normals, summed_normals_by_points
 from fenics_contact._pairing.sliding.meeting import Meeting
@@ -269,14 +274,14 @@ class MovingMeans:
         size = dim * points.master.shape[1]
 
         def among_all(rows: sp.csr_matrix) -> sp.csr_matrix:
-            """Return rows by the dofs of both surfaces, or of the slave, as rows by those of all bodies."""
+            """Return rows by the dofs of both surfaces as rows by those of all bodies."""
             whole = sp.csr_matrix((rows.data, dof[rows.indices], rows.indptr), shape=(rows.shape[0], size))
             whole.sum_duplicates()  # of nodes on both surfaces, and sorted
             return whole
 
         found = weight_derivatives(self.slave, self.master, self.coupling, wanted, self.comm)
         turn = tuple(
-            among_all(scaled_rows(self._turned(points.tangents[:, a]), wanted.astype(float)))
+            among_all(scaled_rows(self._turned(points.tangents[:, a], found), wanted.astype(float)))
             for a in range(dim - 1)
         )
         # The slave's own mean takes the place of its node: its weights are on the other side.
@@ -284,13 +289,54 @@ class MovingMeans:
         rows = scaled_rows(found.rows, np.where(found.node < len(self.master_nodes), 1.0, -1.0))
         return MeanMotion(turn, found.point, every[found.node], among_all(rows))
 
-    def _turned(self, along: np.ndarray) -> sp.csr_matrix:
-        """Return v·δn of the points by the slave's nodes for vectors v across the normals, (n, n_dofs)."""
-        slave, node = self.slave, self.coupling.node
+    def _turned(self, along: np.ndarray, weights: WeightDerivatives) -> sp.csr_matrix:
+        """Return v·δn of the points by the nodes of both for vectors v across the normals, (n, n_dofs).
+
+        `weights`: derivatives of the weights of all points where v counts.
+        """
+        slave, master, node = self.slave, self.master, self.coupling.node
+        of_master = MasterNormals.of(slave, master, node, self.coupling.weight)
         size = np.linalg.norm(summed_normals(slave, slave.points)[node], axis=1)[:, None]
-        vectors = np.zeros_like(slave.points)
-        vectors[node] = -slave.within(along, slave.mirrored[node]) / size
-        return summed_normals_by_points(slave, vectors)[node]
+        vectors = -slave.within(along, slave.mirrored[node]) / size
+        vectors[of_master.point] = 0.0
+        everywhere = np.zeros_like(slave.points)
+        everywhere[node] = vectors
+        own = summed_normals_by_points(slave, everywhere)[node]
+        rows = sp.csr_matrix((own.data, own.indices, own.indptr), shape=(len(node), weights.rows.shape[1]))
+        if not len(of_master.point):
+            return rows
+        turned = self._turned_by_master(of_master, along[of_master.point], weights)
+        return (rows + placed(of_master.point, len(node)) @ turned).tocsr()
+
+    def _turned_by_master(
+        self, chosen: MasterNormals, along: np.ndarray, weights: WeightDerivatives
+    ) -> sp.csr_matrix:
+        """Return v·δn of the points that have normals of the master, by the nodes of both, (m, n_dofs).
+
+        With n = N / ‖N‖ that is v·Σ (δW_j m_j + W_j δm_j) / ‖N‖, and m_j = S_j / ‖S_j‖ of summed areas S_j.
+        """
+        master, (count, size) = self.master, (len(chosen.point), weights.rows.shape[1])
+        along = chosen.across(self.slave, self.coupling.node, along)
+        place = np.full(len(self.coupling.node), -1)
+        place[chosen.point] = np.arange(count)
+        mine = np.flatnonzero((place[weights.point] >= 0) & (weights.node < len(master.nodes)))
+        row, node = place[weights.point[mine]], weights.node[mine]
+        lever = np.einsum("md,md->m", along[row], master.normals[node])
+        result = sp.csr_matrix((lever, (row, mine)), shape=(count, weights.rows.shape[0])) @ weights.rows
+        weight = self.coupling.weight[chosen.point]
+        used = np.zeros(len(master.nodes), dtype=bool)
+        used[weight.indices] = True
+        near = replace(master, facets=master.facets[used[master.facets].any(axis=1)], relief=None)
+        length = np.linalg.norm(summed_normals(near, near.points), axis=1)[:, None]
+        for component, direction in enumerate(np.eye(master.dim)):
+            vectors = direction - master.normals[:, [component]] * master.normals
+            vectors = near.within(vectors, near.mirrored) / np.where(length > 0.0, length, 1.0)
+            vectors[~used] = 0.0
+            own = weight @ summed_normals_by_points(near, vectors)
+            own = scaled_rows(own.tocsr(), along[:, component])
+            first = size - own.shape[1]  # the nodes of the slave come first
+            result = result + sp.csr_matrix((own.data, own.indices + first, own.indptr), shape=(count, size))
+        return result.tocsr()
 
 
 @displayed
@@ -335,7 +381,7 @@ class PointAreas:
             surface, body = slave_of(scene, pair, "faceted"), pair.slave.body
             nodes = NodeNumbers.of(scene).global_nodes(body, surface.nodes)
             slave, point = points.of_surface(index, np.arange(count))
-            own = surface.areas_at(coordinates[nodes])[np.searchsorted(nodes, slave)]
+            own = surface.point_areas_at(coordinates[nodes])[np.searchsorted(nodes, slave)]
             np.add.at(areas.now, point, own)  # a point may have the areas of several nodes
             mine = points.pair == index
             areas.much[mine] = scene.bodies[body].deforms_much

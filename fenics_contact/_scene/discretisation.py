@@ -1,0 +1,117 @@
+"""The discretisation of pairs and ties: that which they were given, or the better one of their scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeAlias, TypeVar
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface
+from fenics_contact._scene.parts import SceneParts
+from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
+from fenics_contact._surfaces.projection import surfaces_match
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import vector_areas
+from fenics_contact.mesh.near_surfaces import FACING
+
+#: Why every contact with an obstacle is by nodes.
+RIGID = "as the master is rigid"
+#: Reason of a choice that other meshes do not change.
+REMESHED = "as on the meshes before the last one"
+
+Pair = TypeVar("Pair", bound=ContactPair | AnyTie)
+AnyScene = TypeVar("AnyScene", bound="SceneParts")
+
+_Choices: TypeAlias = dict[tuple[str, str], tuple[Discretisation, str]]
+
+_KNOWN: WeakKeyDictionary[BodyMesh, WeakKeyDictionary[BodyMesh, _Choices]] = WeakKeyDictionary()
+"""Discretisations of surfaces of two meshes, shared with reshaped meshes."""
+
+
+def with_discretisation(scene: SceneParts, pairs: Sequence[Pair]) -> tuple[Pair, ...]:
+    """Return pairs with the discretisation that they were given, or with the better one of the scene.
+
+    It is that of the undeformed meshes before any design moved them, the same for all loads.
+    """
+    return tuple(_with_choice(scene, pair) for pair in pairs)
+
+
+def keeping_discretisation(scene: AnyScene) -> AnyScene:
+    """Return the scene with choices that stay when its bodies get other meshes."""
+    return replace(scene, contacts=[*map(_kept, scene.contacts)], ties=[*map(_kept, scene.ties)])
+
+
+def in_words(pair: ContactPair | AnyTie) -> str:
+    """Return the discretisation of a pair and, where the scene chose it, why."""
+    if not isinstance(pair.master, Surface):
+        return f"node, {RIGID}"
+    return pair.reason or pair.discretisation
+
+
+def _with_choice(scene: SceneParts, pair: Pair) -> Pair:
+    chosen = pair.discretisation == "best" or bool(pair.reason)
+    if not chosen or pair.reason.endswith(REMESHED):
+        return pair
+    found, why = _choice(scene, pair)
+    reason = f"{found}, {why}"
+    return pair if pair.reason == reason else replace(pair, discretisation=found, reason=reason)
+
+
+def _kept(pair: Pair) -> Pair:
+    """Return a pair whose choice does not depend on meshes any more."""
+    return replace(pair, reason=f"{pair.discretisation}, {REMESHED}") if pair.reason else pair
+
+
+def _choice(scene: SceneParts, pair: ContactPair | AnyTie) -> tuple[Discretisation, str]:
+    """Return the better discretisation of a pair, and why."""
+    if not isinstance(pair.master, Surface):
+        return "node", RIGID
+    if isinstance(pair, ContactPair) and pair.within_body:
+        return "node", "as the body meets itself"
+    if isinstance(pair, ContactPair) and pair.nodes is not None:
+        return "node", f"as the nodes of {pair.nodes!r} touch"
+    sides = pair.slave, pair.master
+    slave, master = (scene.bodies[side.body].mesh.origin for side in sides)
+    known = _KNOWN.setdefault(slave, WeakKeyDictionary()).setdefault(master, {})
+    names = pair.slave.name, pair.master.name
+    if isinstance(pair, CyclicSymmetry):
+        match = _sides_match(scene, pair, slave, master)
+        return ("node", "as the meshes match") if match else ("mortar", "as the meshes do not match")
+    if names not in known:
+        known[names] = _chosen_by_meshes(slave, master, names)
+    return known[names]
+
+
+def _chosen_by_meshes(
+    slave: BodyMesh, master: BodyMesh, names: tuple[str, str]
+) -> tuple[Discretisation, str]:
+    sides = _faceted(slave, names[0]), _faceted(master, names[1])
+    if slave.order == master.order and surfaces_match(*sides):
+        return "node", "as the meshes match"
+    if _face(*sides):
+        return "mortar", "as the meshes do not match"
+    return "node", "as no facets face each other: corners or edges touch"
+
+
+def _face(slave: FacetedSurface, master: FacetedSurface) -> bool:
+    """Return whether any two facets face each other, wherever they are."""
+    own, other = (vector_areas(side.points, side.facets) for side in (slave, master))
+    own, other = (each / np.linalg.norm(each, axis=1)[:, None] for each in (own, other))
+    apart, _ = cKDTree(other).query(-own)
+    return bool(apart.min() < np.sqrt(2.0 * (1.0 - FACING)))
+
+
+def _sides_match(scene: SceneParts, sector: CyclicSymmetry, slave: BodyMesh, master: BodyMesh) -> bool:
+    """Return whether the meshes of both sides of a sector do."""
+    turned = sector.turned(master.points, scene.sector_angle(sector))
+    facets = slave.linear.surfaces[sector.slave.name], master.linear.surfaces[sector.master.name]
+    return surfaces_match(faceted_surface(slave.points, facets[0]), faceted_surface(turned, facets[1]))
+
+
+def _faceted(mesh: BodyMesh, surface: str) -> FacetedSurface:
+    return faceted_surface(mesh.points, mesh.linear.surfaces[surface])

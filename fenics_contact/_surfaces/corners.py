@@ -1,0 +1,49 @@
+"""Corners and edges of bodies, where a surface has no normal of its own."""
+
+from __future__ import annotations
+
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from fenics_contact._surfaces.facets import faceted_surface
+from fenics_contact._surfaces.true_surface import is_crease, joints_of
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import boundary_faces
+from fenics_contact.mesh.linear_facets import linear_facets
+
+_KNOWN: WeakKeyDictionary[BodyMesh, dict[tuple[str, bytes], np.ndarray]] = WeakKeyDictionary()
+"""Which nodes of surfaces of meshes are sharp, shared with reshaped meshes."""
+
+#: Creases count from this angle on, in degrees: half of it is how far a mean normal may be off.
+SHARP = 2.0
+
+
+def sharp_nodes(mesh: BodyMesh, name: str, cuts: np.ndarray) -> np.ndarray:
+    """Return which nodes of a surface, ascending, lie on corners or edges of the body, shape (n,).
+
+    Facets of the body beside the surface count, too: a surface may end at an edge, see `is_crease`. It is
+    that of the mesh before any design moved it.
+
+    `cuts`: which nodes lie on sides where the body goes on, such as planes of symmetry, (n_nodes, n_sides).
+    """
+    known = _KNOWN.setdefault(mesh.origin, {})
+    key = name, cuts.tobytes()
+    if key not in known:
+        known[key] = _sharp(mesh.origin, np.unique(mesh.origin.linear.surfaces[name]), cuts)
+    return known[key]
+
+
+def _sharp(mesh: BodyMesh, nodes: np.ndarray, cuts: np.ndarray) -> np.ndarray:
+    cells = mesh.linear.cells
+    marked = np.zeros(mesh.n_nodes, dtype=bool)
+    marked[nodes] = True
+    if mesh.hanging is None:
+        # All cells at a node are among these, so that no face with a node of the surface seems to be outside.
+        cells = cells[marked[cells].any(axis=1)]
+    faces, _ = boundary_faces(cells, mesh.dim, mesh.hanging)
+    faces = faces[marked[faces].any(axis=1) & ~cuts[faces].all(axis=1).any(axis=1)]
+    surface = faceted_surface(mesh.points, linear_facets(faces, mesh.dim).rows)
+    joints = joints_of(surface)
+    creases = joints.corners[is_crease(surface, joints) & (joints.angle > np.radians(SHARP)), 0]
+    return np.isin(nodes, surface.nodes[surface.facets.ravel()[creases]])
