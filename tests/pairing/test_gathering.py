@@ -24,7 +24,7 @@ from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.qp import FaceNewton
-from tests.pairing.mortar_surfaces import KINDS, plate
+from tests.pairing.mortar_surfaces import CURVED, KINDS, plate
 
 MEAN = 0.0125
 WIDTH = 0.5
@@ -135,3 +135,35 @@ def test_planes_of_symmetry_through_the_rim_halve_the_scene() -> None:
         found.append(np.column_stack([places, state.contact.pressure])[kept][order])
     assert gathers(half.contact.points, half.scene.bodies["bed"])
     np.testing.assert_allclose(found[0], found[1], rtol=1e-6, atol=1e-7)
+
+
+def spectrum(points: MortarPoints) -> np.ndarray:
+    """Of the symmetric part of the slave's means, in terms of areas, where gathered nodes follow points."""
+    coupling, gathering = points.coupling, points.gathering
+    assert coupling.own is not None
+    own = coupling.own.toarray()
+    if gathering is None:
+        own = own[:, coupling.node]
+    else:
+        own = own[:, gathering.whole.node] @ gathering.part.toarray().T
+    root = np.sqrt(coupling.area)
+    matrix = root[:, None] * own / root
+    return np.linalg.eigvalsh((matrix + matrix.T) / 2)
+
+
+QUADRATIC = [each for each in CURVED if each[0] not in ("edges", "quads")]
+
+
+@pytest.mark.parametrize("kinds", QUADRATIC, ids="-".join)
+def test_pressures_of_quadratic_slaves_are_determined_wherever_the_rim_of_the_master_lies(
+    kinds: tuple[str, str],
+) -> None:
+    """Covered in part, facets have means far from their nodes, which gathering keeps positive."""
+    slave, values, plain = plate(kinds[0], 4, up=False, uneven=0.0), list[np.ndarray](), list[np.ndarray]()
+    for end in 0.75 + 0.25 * np.array([0.003, 0.03, 0.1, 0.3, 0.45, 0.55, 0.7, 0.97]):
+        points = met_by(slave, plate(kinds[1], 3, low=-0.2, high=float(end)))
+        values.append(spectrum(points))
+        whole = points.coupling if points.gathering is None else points.gathering.whole
+        plain.append(spectrum(MortarPoints(slave, points.master, whole, None, None)))
+    assert np.concatenate(plain).min() < 0.6, "covered facets alone are close to their nodes"
+    assert 0.3 < np.concatenate(values).min() < np.concatenate(values).max() < 2.2

@@ -258,8 +258,11 @@ class MortarCoupling:
         gap: n_i · (x_i − Σ_j weight_ij x_j + relief_i), positive when open, shape (n,), [length].
         own: Weights of the slave's nodes in its mean that takes the place of x_i, shape (n,
             len(slave.nodes)); rows add up to one. None where the mean is the node. On quadratic facets these
-            are ∫ ψ_i N_j / D_i with the quadratic functions, close to the identity: the spectrum of its
-            symmetric part, in terms of D, lies between 0.69 and 1.37 on all of them.
+            are ∫ ψ_i N_j / D_i with the quadratic functions. Where facets face the master entirely they are
+            close to the identity: the spectrum of the symmetric part, in terms of D, lies between 0.69 and
+            1.37 on all of them. Where the rim of the master covers facets in part, functions are extrapolated
+            and it is wider, with negative values; once nodes that hardly face the master are gathered, see
+            `gathering`, it was positive wherever the rim lay, between 0.36 and 2.14.
     """
 
     node: np.ndarray
