@@ -40,6 +40,7 @@ from fenics_contact._pairing.projection import (
     warn_of_surface,
     warn_of_uneven_pressure,
 )
+from fenics_contact._pairing.tips import carrying
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
@@ -455,19 +456,25 @@ def _measured(
     if isinstance(pair, CyclicSymmetry):
         axial = pair.axial_nodes(scene.bodies[pair.slave.body].mesh, pair.slave.name)
         movable &= ~np.isin(slave.nodes, numbers.global_nodes(pair.slave.body, axial))
-    bearing = movable & (slave.surface.areas > 0.0) if isinstance(pair, ContactPair) else movable
-    bearing = bearing & may_touch(scene.bodies, pair, slave.surface)
+    bearing = movable & may_touch(scene.bodies, pair, slave.surface)
     if not told:
         warn_of_surface(scene, pair.slave, pair.geometry, slave.surface, comm)
-    if not isinstance(pair.master, Surface):
+    master: _Side | RigidObstacle
+    if isinstance(pair.master, Surface):
+        master = _Side.of(scene, pair.master, pair.geometry, numbers, finer)
+    else:
+        master = pair.master
+    if isinstance(pair, ContactPair):
         with together(comm):
-            points = _on_obstacle(slave, bearing, pair.master)
-            if isinstance(pair.master, RigidTool):
-                points = _carried(points, slave, pair.master, scene, numbers)
-        name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
+            bearing &= carrying(pair, slave.surface, master.surface if isinstance(master, _Side) else master)
+    if not isinstance(master, _Side):
+        with together(comm):
+            points = _on_obstacle(slave, bearing, master)
+            if isinstance(master, RigidTool):
+                points = _carried(points, slave, master, scene, numbers)
+        name = f"what ContactPair {index} asks its obstacle, {type(master).__name__}"
         require_alike(comm, described((points.slave, points.normal, points.gap), name))
     else:
-        master = _Side.of(scene, pair.master, pair.geometry, numbers, finer)
         if isinstance(pair, CyclicSymmetry):
             from fenics_contact._pairing.sectors import check_sides
 
@@ -475,6 +482,7 @@ def _measured(
             with together(comm):
                 check_sides(pair, scene.sector_angle(pair), slave.surface, master.surface)
         if not told:
+            assert isinstance(pair.master, Surface)
             warn_of_surface(scene, pair.master, pair.geometry, master.surface, comm)
         if isinstance(pair, Tie) and not pair.sliding and not told and axes is None:
             one, other = ((side.surface, fixed[side.nodes]) for side in (slave, master))
@@ -613,7 +621,7 @@ def _points(
     count, axes = len(chosen), reference_axes(normal)
     return ContactPoints(
         np.zeros(count, dtype=np.int64), slave.nodes[chosen], weight, normal, tangent_frames(normal, axes),
-        gap, slave.surface.areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)), axes,
-        np.zeros(normal.shape, dtype=bool), gap, np.zeros(count, dtype=bool),
+        gap, slave.surface.point_areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)),
+        axes, np.zeros(normal.shape, dtype=bool), gap, np.zeros(count, dtype=bool),
         length=slave.surface.sizes[chosen] if slave.surface.axisymmetric else None,
     )  # fmt: skip

@@ -161,6 +161,17 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = F
     return areas
 
 
+def ends_on_axis(points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of quadratic edges that lie on an axis of revolution, and their midpoints, (n,) each.
+
+    A uniform pressure makes no force at such an end, but a tip that presses there does.
+    """
+    if facets.shape[1] != 3 or points.shape[1] != 2:
+        return np.zeros((2, 0), dtype=np.int64)[0], np.zeros(0, dtype=np.int64)
+    facet, end = np.nonzero(points[facets[:, :2], 0] <= computed_rounding(points))
+    return facets[facet, end], facets[facet, 2]
+
+
 def bearing_pulled_back(by_areas: np.ndarray) -> np.ndarray:
     """Vector-Jacobian product of `bearing_areas` with respect to `nodal_areas`, the shape of facets."""
     if not has_midside_pressure(by_areas):
@@ -188,6 +199,8 @@ def share_areas(mesh: BodyMesh, name: str) -> np.ndarray:
 def filled_on_axis(facets: np.ndarray, values: np.ndarray, on_axis: np.ndarray) -> np.ndarray:
     """Fill in values at ends of quadratic edges on an axis of revolution: those of an even parabola.
 
+    Larger values stay: a tip that presses there has no neighbour that does.
+
     `facets`: node numbers, (n, nodes of a facet); values stay as they are unless there are three; `values`:
     values at nodes, (n_nodes,) or (n_nodes, k); `on_axis`: marks of nodes, (n_nodes,).
     """
@@ -195,7 +208,8 @@ def filled_on_axis(facets: np.ndarray, values: np.ndarray, on_axis: np.ndarray) 
     if facets.shape[1] == 3:
         for here, there in ((0, 1), (1, 0)):
             edges = facets[on_axis[facets[:, here]]]
-            result[edges[:, here]] = (4 * values[edges[:, 2]] - values[edges[:, there]]) / 3
+            even = (4 * values[edges[:, 2]] - values[edges[:, there]]) / 3
+            result[edges[:, here]] = np.maximum(values[edges[:, here]], even)
     return result
 
 
@@ -434,6 +448,30 @@ class FacetedSurface:
             return self.widths_at(points)
         bearing = bearing_areas(points, facets, self.axisymmetric)
         return np.bincount(facets.ravel(), bearing.ravel(), minlength=len(points))
+
+    def point_areas_at(self, points: np.ndarray) -> np.ndarray:
+        """Return the areas of contact points where the nodes lie elsewhere, shape (n,).
+
+        The end of a quadratic edge on an axis of revolution, to which no area belongs, has that of the linear
+        piece beside it.
+        """
+        areas, (end, middle) = self.areas_at(points), self.discs
+        if not len(end):
+            return areas
+        length = np.linalg.norm(points[middle] - points[end], axis=1)
+        areas[end] = np.pi / 3.0 * length * points[middle, 0]
+        return areas
+
+    @cached_property
+    def discs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Its `ends_on_axis`; none by mortar, where the pieces have areas, and on other bodies."""
+        none = np.zeros(0, dtype=np.int64)
+        return ends_on_axis(self.points, self.bearing) if self.axisymmetric else (none, none)
+
+    @property
+    def point_areas(self) -> np.ndarray:
+        """Areas of contact points, see `point_areas_at`, shape (n,)."""
+        return self.areas if not len(self.discs[0]) else self.point_areas_at(self.points)
 
     def widths_at(self, points: np.ndarray) -> np.ndarray:
         """Return the area of linear facets around each node, on bodies of revolution the length of edges."""

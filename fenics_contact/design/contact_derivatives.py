@@ -26,10 +26,10 @@ from fenics_contact._surfaces.projection import Projection
 from fenics_contact.design.adjoint import LinearisedFace, slips_by_area
 from fenics_contact.design.surface_derivatives import (
     PointDerivatives,
-    areas_pulled_back,
     carriers,
     frames_pulled_back,
     normals_pulled_back,
+    point_areas_pulled_back,
     projection_pulled_back,
     slopes_pulled_back,
 )
@@ -324,7 +324,7 @@ def add_areas(
             surface = replace(surface, points=places[nodes])
         by_areas = np.zeros(len(nodes))
         by_areas[np.searchsorted(nodes, slave)] = given
-        result[nodes] += areas_pulled_back(surface, by_areas)
+        result[nodes] += point_areas_pulled_back(surface, by_areas)
 
 
 def _by_mortar(torn: TornSystem, index: int, rows: RowFields, by_area: np.ndarray) -> np.ndarray:

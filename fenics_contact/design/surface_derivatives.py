@@ -100,6 +100,23 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
     return _products_pulled_back(surface, np.repeat(by_total[:, None], surface.corners, axis=1))
 
 
+def point_areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarray:
+    """Vector-Jacobian product of `point_areas_at` with respect to the surface's nodes, shape (n, dim)."""
+    end, middle = surface.discs
+    if not len(end):
+        return areas_pulled_back(surface, by_areas)
+    by_ends, rest = by_areas[end], by_areas.copy()
+    rest[end] = 0.0
+    result = areas_pulled_back(surface, rest)
+    along = surface.points[middle] - surface.points[end]
+    length = np.linalg.norm(along, axis=1)
+    by_along = (np.pi / 3.0 * by_ends * surface.points[middle, 0] / length)[:, None] * along
+    np.add.at(result, middle, by_along)
+    np.add.at(result, end, -by_along)
+    np.add.at(result[:, 0], middle, np.pi / 3.0 * by_ends * length)
+    return result
+
+
 def _bearing_areas_pulled_back(
     surface: FacetedSurface, facets: np.ndarray, by_areas: np.ndarray
 ) -> np.ndarray:

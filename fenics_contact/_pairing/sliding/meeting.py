@@ -13,6 +13,7 @@ from fenics_contact._pairing.points import PARALLEL, NodeNumbers, are_beside, ti
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
 from fenics_contact._pairing.sliding.closest import ClosestPoints, Roles, moved_surface
 from fenics_contact._pairing.sliding.patches import SmoothPatches
+from fenics_contact._pairing.tips import carrying
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidPlane
 from fenics_contact._scene.pairs import ContactPair, Surface
@@ -204,12 +205,14 @@ def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray, tied: np.ndarra
     slave_nodes = numbers.global_nodes(pair.slave.body, slave.nodes)
     bearing = ~fixed[slave_nodes].all(axis=1) & ~np.isin(slave_nodes, tied)
     bearing &= may_touch(scene.bodies, pair, slave)
-    candidates = np.flatnonzero(bearing & (slave.areas > 0.0))
-    own = np.zeros(len(candidates)), np.zeros(len(candidates), dtype=bool), slave.areas[candidates]
-    if not isinstance(pair.master, Surface):
+    other = pair.master
+    master = surface_of(scene, other, "faceted") if isinstance(other, Surface) else other
+    candidates = np.flatnonzero(bearing & carrying(pair, slave, master))
+    own = np.zeros(len(candidates)), np.zeros(len(candidates), dtype=bool), slave.point_areas[candidates]
+    if not isinstance(master, FacetedSurface):
         none = np.zeros(0, dtype=np.int64), np.zeros((0, dim), dtype=bool)
-        return Meeting(slave, slave_nodes, candidates, *own, None, None, *none, pair.master)
-    master = surface_of(scene, pair.master, "faceted")
+        return Meeting(slave, slave_nodes, candidates, *own, None, None, *none, master)
+    assert isinstance(pair.master, Surface)
     patches = None if pair.by_mortar else SmoothPatches.of(master, smooth=pair.geometry != "faceted")
     nodes = numbers.global_nodes(pair.master.body, master.nodes)
     met = Meeting(
