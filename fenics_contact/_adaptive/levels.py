@@ -10,6 +10,7 @@ from typing import cast
 
 import numpy as np
 
+from fenics_contact._adaptive.crossings import refined_at_crossings
 from fenics_contact._adaptive.goal_errors import goal_error, value_of
 from fenics_contact._adaptive.marking import bulk
 from fenics_contact._adaptive.quantities import quantity as named
@@ -425,11 +426,15 @@ class Way:
             if grown <= growth:
                 break
             share *= (growth - 1.0) / (grown - 1.0)  # meshes need others to be halved, too
-        return found
+        return self._at_crossings(found)
 
     def _at_spots(self) -> SceneRefinement:
         """Return the next meshes where spots are smaller than their cells."""
         return refined_at_spots(self._state, self._doubted)
+
+    def _at_crossings(self, found: SceneRefinement) -> SceneRefinement:
+        """Return the next meshes with smaller cells where materials cross."""
+        return refined_at_crossings(found)
 
     def _halved(self, marked: Mapping[str, np.ndarray]) -> SceneRefinement:
         """Return the next meshes, with some cells halved."""

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO
 
 from fenics_contact import clean_environment
+from tests.random_scenes.corner_intervals import judge_corners
 from tests.random_scenes.deformed_judge import judge_history
 from tests.random_scenes.intervals import judge_interval
 from tests.random_scenes.judge import Outcome, Verdict, judge, judge_revolved
@@ -26,9 +27,10 @@ ROOT = Path(__file__).parents[2]
 PATIENCE = 40.0
 Judge = Callable[[int], Verdict]
 #: Scenes of small strain and linear materials, those of revolution, and histories of large deformations;
-#: intervals of quantities.
+#: intervals of quantities, and of scenes with corners and contrasts.
 JUDGES: dict[str, Judge] = {
     "linear": judge, "revolved": judge_revolved, "deformed": judge_history, "intervals": judge_interval,
+    "corners": judge_corners,
 }  # fmt: skip
 #: Begins the lines that a worker writes; libraries may write others.
 MARK = "verdict: "

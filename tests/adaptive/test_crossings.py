@@ -1,0 +1,89 @@
+"""Where stiff and soft materials cross, cells become far smaller than elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import Body, BodyMesh, Scene, Support, Traction, solve_scene, solve_to
+from fenics_contact._adaptive.crossings import around_crossings, refined_at_crossings
+from fenics_contact._adaptive.refined_scene import SceneRefinement
+from fenics_contact.gallery import block, rectangle, rectangle_lattice
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import quadratic
+from tests.random_scenes.corners import graded
+
+
+def squares(mesh: BodyMesh, stiffer: float, hard: np.ndarray) -> Body:
+    """A body with two Young's moduli."""
+    regions = {"hard": np.flatnonzero(hard), "soft": np.flatnonzero(~hard)}
+    plain = PlaneStrain if mesh.dim == 2 else IsotropicElasticity
+    materials = {"hard": plain(1000.0 * stiffer, 0.3), "soft": plain(1000.0, 0.3)}
+    return Body(replace(mesh, regions=regions), materials)
+
+
+def checkered(mesh: BodyMesh, stiffer: float) -> Body:
+    """Squares that cross at the origin."""
+    middle = mesh.points[mesh.cells].mean(axis=1)
+    return squares(mesh, stiffer, middle[:, 0] * middle[:, 1] > 0.0)
+
+
+def whole(cell: str = "triangle") -> BodyMesh:
+    return rectangle((-1.0, -1.0), (1.0, 1.0), (4, 4), cell)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral"])
+def test_crossings_are_where_materials_alternate(cell: str, order: int) -> None:
+    mesh = whole(cell) if order == 1 else quadratic(whole(cell))
+    body = checkered(mesh, 100.0)
+    touching = np.isclose(body.mesh.points[body.mesh.cells], 0.0).all(axis=2).any(axis=1)
+    known = (cell, order) != ("quadrilateral", 2)  # these are halved all together
+    assert np.array_equal(around_crossings(body), np.flatnonzero(touching & known))
+    assert touching.any()
+
+
+def test_sides_and_corners_of_inclusions_and_materials_alike_are_no_crossings() -> None:
+    middle = whole().points[whole().cells].mean(axis=1)
+    assert len(around_crossings(checkered(whole(), 9.0))) == 0
+    assert len(around_crossings(checkered(whole(), 11.0))) > 0
+    assert len(around_crossings(squares(whole(), 100.0, middle[:, 0] > 0.0))) == 0
+    assert len(around_crossings(squares(whole(), 100.0, (middle > 0.0).all(axis=1)))) == 0
+    assert len(around_crossings(Body(whole(), PlaneStrain(1.0, 0.3)))) == 0
+    assert len(around_crossings(checkered(block((-1, -1, 0), (1, 1, 1), (2, 2, 1)), 100.0))) == 0
+
+
+@pytest.mark.parametrize(
+    ("cell", "halvings", "width"), [("triangle", 4, 0.5**6), ("quadrilateral", 40, 1e-7)]
+)
+def test_cells_at_crossings_are_halved_down_to_rounding(cell: str, halvings: int, width: float) -> None:
+    scene = Scene({"b": checkered(whole(cell), 100.0)}, [Support("b", "x0")])
+    mesh = refined_at_crossings(SceneRefinement(scene, {}), halvings).scene.bodies["b"].mesh
+    size = np.ptp(mesh.points[mesh.cells], axis=1).max(axis=1).min() / 2.0  # relative to the body
+    assert 0.5 * width < size < 1.01 * width
+    assert mesh.n_cells < 500
+
+
+def stretched(body: Body) -> Scene:
+    return Scene({"b": body}, [Support("b", "x0")], [Traction("b", "x1", (1.0, 0.0))])
+
+
+def graded_energy(layers: int) -> float:
+    """The energy on quadratic cells that get wider by 2.5 from layer to layer around the crossing."""
+    lines = graded(layers, 2.5)(np.array([-1.0, 0.0, 1.0]))
+    body = checkered(quadratic(rectangle_lattice([lines, lines])), 100.0)
+    return float(solve_scene(stretched(body), MPI.COMM_SELF, tolerance=1e-8).energies.strain)
+
+
+def test_the_energy_of_squares_that_cross_is_within_what_is_stated() -> None:
+    """Stated 4.3 % and 7.1 % off while cells at the crossing became smaller at the rate of others."""
+    first, second, third = (graded_energy(layers) for layers in (6, 9, 12))
+    exact = third + (third - second) ** 2 / ((second - first) - (third - second))
+    assert exact == pytest.approx(5.885e-4, rel=0.002)  # of meshes by another grading
+    found = solve_to(stretched(checkered(whole(), 100.0)), "strain_energy", 0.055, MPI.COMM_SELF)
+    assert found.reached
+    assert abs(found.value - exact) < 0.5 * found.error
+    assert found.levels[-1].unknowns < 3000
