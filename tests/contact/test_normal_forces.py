@@ -31,7 +31,6 @@ from fenics_contact.output.tables import step_row
 from fenics_contact.pictures import plot_contact_pressure
 from fenics_contact.results.contact import NormalForces
 from fenics_contact.results.state import State, pairs_in_words
-from tests.page.test_page import text_of
 
 INNER, OUTER, OVERLAP, E, NU = 12.0, 20.0, 0.01, 2.1e5, 0.3
 #: Pressure of a ring shrunk on a rigid shaft without friction, by Lamé, in plane strain.
@@ -86,7 +85,7 @@ def test_every_output_names_both(state: State, tmp_path: Path, monkeypatch: pyte
     written = dict(zip(names, row, strict=True))
     assert float(written["normal_force"]) == pytest.approx(forces.sum)
     assert float(written["normal_resultant"]) == pytest.approx(forces.resultant, abs=1e-9)
-    page = text_of(result_page(state).html or "")
+    page = result_page(state).html or ""
     assert "sum of normal forces" in page
     assert "their resultant" in page
     told: list[str] = []
