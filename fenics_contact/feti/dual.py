@@ -209,7 +209,7 @@ class DualSystem:
         bent = self.inverse(torn.load)
         self._bent = bent[self.inverse.interface]
         rhs = self.jump(bent) - torn.right
-        self.problem = replace(self.problem, rhs=rhs, compliance=torn.compliance)
+        self.problem = replace(self.problem, rhs=rhs, compliance=torn.compliance, given=torn.right)
 
     def _inverse(
         self, torn: TornSystem, condensations: Condensations, kind: LocalKind, known: TornInverse | None

@@ -96,6 +96,8 @@ class DualProblem:
         friction: The law of the slip bounds; None where no disc carries a force.
         compliance: By how much contact rows give way to their forces; None where none does.
         least: Sizes below which those of forces and jumps do not fall in residuals; None: no such sizes.
+        given: c of all rows, the gaps before anything moves, owned, shape (size,), [length]; None where it
+            does not matter where bodies without forces are.
         exact: F in double precision, owned to owned, collective, where `operator` is in single precision and
             only directions and images of Krylov methods are computed by it; None where it is exact itself.
     """
@@ -114,6 +116,7 @@ class DualProblem:
     compliance: Compliance | None = None
     least: LeastSizes | None = None
     exact: Operator | None = None
+    given: Vector | None = None
 
     @cached_property
     def between_supports(self) -> Marks:
@@ -239,6 +242,7 @@ class Scaling:
             operator=scaled(problem.operator),
             exact=None if problem.exact is None else scaled(problem.exact),
             rhs=s * problem.rhs,
+            given=None if problem.given is None else s * problem.given,
             coarse=self.coarse,
             diagonal=s**2 * problem.diagonal,
             preconditioner=None if precondition is None else _scaled(precondition, s),

@@ -14,6 +14,7 @@ from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.problem import CountedOperator, DualProblem, LeastSizes
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
+from fenics_contact.qp.resting import LooseMotions
 from fenics_contact.qp.solution import (
     DualSolution,
     SolverStep,
@@ -178,7 +179,20 @@ def solve(
         under_law = problem.with_law(law or _slip_law(problem, slip_bound, friction_coefficient))
     same = isinstance(start, DualSolution) and start.problem is problem
     find = _solve_scaled if problem.scaling is not None else _solve_as_given
-    return replace(find(under_law, solver, start, same), problem=problem)
+    found = _settled(under_law, find(under_law, solver, start, same), solver.tolerance)
+    return replace(found, problem=problem)
+
+
+def _settled(problem: DualProblem, found: DualSolution, tolerance: float) -> DualSolution:
+    """Return a solution with bodies on which nothing acts where they were, as far as they do not overlap."""
+    loose = LooseMotions.of(problem, found.multiplier, found.residual)
+    motion = None if loose is None else loose.settled()
+    if motion is None:
+        return found
+    moved = answer_at(problem, found.multiplier, found.product, found.alpha + motion)
+    if not moved.residuals.within(tolerance):
+        return found
+    return replace(found, residual=moved.residual, residuals=moved.residuals, alpha=found.alpha + motion)
 
 
 def _solve_as_given(
@@ -333,9 +347,14 @@ def _begin(
 
 
 def _at_rest(problem: DualProblem, begin: Start) -> Start:
-    """Return the start without any force. Collective."""
+    """Return the start without any force, where bodies do not overlap if that is possible. Collective."""
     nothing = np.zeros_like(begin.iterate.multiplier)
-    return replace(begin, iterate=iterate_fitted(problem, nothing, nothing), cold=True)
+    iterate = iterate_fitted(problem, nothing, nothing)
+    loose = LooseMotions.of(problem, nothing, iterate.residual)
+    motion = None if loose is None else loose.settled()
+    if motion is not None:
+        iterate = iterate_at(problem, nothing, nothing, iterate.motions(problem) + motion)
+    return replace(begin, iterate=iterate, cold=True)
 
 
 def _as_it_is(problem: DualProblem, start: Start, tolerance: float) -> DualSolution | None:

@@ -21,7 +21,7 @@ from fenics_contact.qp.face_newton import FaceNewton
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.results.contact import RowValues
 from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
-from fenics_contact.results.rigid_motions import UnheldMotion, unheld_motions
+from fenics_contact.results.rigid_motions import UnheldMotion, idle_motions, unheld_motions
 from fenics_contact.results.state import State, comm_of
 
 if TYPE_CHECKING:
@@ -112,8 +112,10 @@ class LinearState(State):
 
     @cached_property
     def unheld(self) -> tuple[UnheldMotion, ...]:
-        """Rigid motions that nothing resists and nothing loads; the bodies stay. Collective on first use."""
-        return unheld_motions(self.system) if isinstance(self.system, DualSystem) else ()
+        """See `State.unheld`. Collective on first use."""
+        if not isinstance(self.system, DualSystem) or not isinstance(self.solution, DualSolution):
+            return ()
+        return unheld_motions(self.system) + idle_motions(self.system, self.solution)
 
     @cached_property
     @collectively("LinearState.conforming_displacement", comm_of)

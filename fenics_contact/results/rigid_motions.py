@@ -15,6 +15,8 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.resting import LooseMotions
+from fenics_contact.qp.solution import DualSolution
 
 
 @displayed
@@ -41,6 +43,15 @@ class UnheldMotion:
 def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
     """Return the motions that a dual system leaves out. Collective."""
     return rigid_motions(system.torn, system.unheld) if system.unheld.shape[1] else ()
+
+
+def idle_motions(system: DualSystem, solution: DualSolution) -> tuple[UnheldMotion, ...]:
+    """Return the motions by which contact opens that touches without a force. Collective."""
+    loose = LooseMotions.of(solution.problem, solution.multiplier, solution.residual)
+    ways = np.zeros((system.kernel.shape[1], 0)) if loose is None else loose.opening()
+    if ways.shape[1] == 0:
+        return ()
+    return rigid_motions(system.torn, system.kernel.combined(sp.csr_matrix(ways)).tocsr())
 
 
 def rigid_motions(torn: TornSystem, fields: sp.spmatrix) -> tuple[UnheldMotion, ...]:

@@ -287,7 +287,10 @@ class State(ABC):
     def unheld(self) -> tuple[UnheldMotion, ...]:
         """Rigid motions that nothing resists and nothing loads. Collective on first use.
 
-        Along these the bodies stay where they are, on average over their volume.
+        Along these the bodies stay where they are, on average over their volume. Among them are those by
+        which contact opens that touches, but carries no force: bodies that are unloaded, or a joint that a
+        load pulls with just the force that clamps it. These go back to their first distances, as far as they
+        then do not overlap.
         """
         return ()
 
