@@ -75,13 +75,14 @@ def _alike(
     across: tuple[sp.csr_matrix, np.ndarray],
     both: Sequence[np.ndarray],
     rubs: np.ndarray,
-    same_place: float = 0.95,
+    same_place: float = 1.0 - 1e-6,
 ) -> np.ndarray:
     """Return which points compare the same places as others, shape (n,).
 
     `places`: of the slave nodes, shape (n_points, dim); `across`: see `_across`; `both`: numbers of points
     and of others, shape (n,) each; `rubs`: whether both must slip alike, too, shape (n,); `same_place`:
-    cosine between rows less what equations make of them, as for `around_once`.
+    cosine between rows less what equations make of them. Where meshes do not match, rows of both edges are
+    means over different facets by mortar: these are two points, whose forces are determined.
     """
     (rows, moved), (one, other) = across, both
     width = moved.shape[1]
