@@ -13,13 +13,14 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
-from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._base.progress import PhaseTimer, Task
 from fenics_contact._large_deformations.equations import Configuration, Equations, Linearisation
 from fenics_contact._large_deformations.loading import Drag, Loading
 from fenics_contact._large_deformations.moving_contact import ContactConfiguration
@@ -300,6 +301,12 @@ class AutomaticSteps:
         assert at.contact is not None
         way = _Way(self, equations, first, target, at.contact, timer)
         now = Progress(at, first.torn, known, (at, first.torn), at.contact.start)
+        with _Parts() as parts:
+            return way.path(self._followed(way, now, parts, held=held))
+
+    def _followed(self, way: _Way, now: Progress, parts: _Parts, *, held: bool) -> Progress:
+        """Return the progress at the end of the way. Collective."""
+        equations, first, target = way.equations, way.first, way.target
         part = self.first
         longest = min(each.longest_part(first, target) for each in (equations.contact, equations.rigid_start))
         smallest = max(self.smallest, self.smallest_before_snap) if self.snaps else self.smallest
@@ -312,13 +319,15 @@ class AutomaticSteps:
                 if not held and isinstance(failure, NotHeldError) and now.reached == 0.0:
                     raise failure
                 part *= 0.5
+                parts.fail(now, fraction, failure)
                 if part >= smallest:
                     safe_log(_LOG.info, "load step cut to %.3g: %s", part, failure)
                     continue
                 now = way.snapped(now, fraction, 2 * part, failure)
             assert now.end is not None
+            parts.reach(now)
             part *= 2.0 if len(now.end.effort.history) <= self.easy else 1.0
-        return way.path(now)
+        return now
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,6 +374,37 @@ class Progress:
             start=start, end=found, reached=fraction, fractions=(*self.fractions, fraction), since=since,
             rubbed=rubbed, ended=ends,
         )  # fmt: skip
+
+
+class _Parts:
+    """Reports how far a load step is followed, once a part of it has failed."""
+
+    def __init__(self) -> None:
+        """Begin without a failure."""
+        self._task = Task("load step in parts", unit="done")
+        self._failed, self._at = "", 0.0
+
+    def fail(self, now: Progress, fraction: float, failure: ConvergenceError) -> None:
+        """Report that a part fails, and why."""
+        self._failed, self._at = f", {fraction:.3g} of it fails: {str(failure).partition(':')[0]}", fraction
+        self.reach(now)
+
+    def reach(self, now: Progress) -> None:
+        """Report how far the load is followed, and what failed last."""
+        if self._failed:
+            ahead = self._failed if now.reached < self._at else ""
+            self._task.step(len(now.fractions), words=f"{now.reached:.3g} of the load reached{ahead}")
+
+    def __enter__(self) -> _Parts:
+        """Report nothing yet."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End what has been reported."""
+        if self._failed:
+            self._task.end(error)
 
 
 @dataclass(frozen=True, eq=False)

@@ -120,6 +120,7 @@ class TangentNewton:
         patience: Steps in which the residual must halve; else this care begins, and from the second time on
             the natural map becomes more cautious.
         caution: Factor on ρ of the natural map then.
+        stalls: How often that may happen while the residual is above `near`.
         room: Part of the smallest det F that a step must leave.
         near: Residual below which a first step without progress is reason enough for care.
         least_care: Least factor by care, so that linear systems are not solved beyond rounding.
@@ -131,6 +132,7 @@ class TangentNewton:
         slipped: Part of the slip bound within which a disc counts as slipping at the start of a load step:
             what slipped in the last one mostly goes on.
         nested: Tolerance of contact problems that are solved as a whole, at the start of a history.
+        rescues: Rescues of these where the load step is cut instead: active sets that cycle come back to it.
         few: Rows of gluing and supports up to which linear systems without contact are solved to `sharp`:
             there products are cheap beside a tangent, and where a body hardly resists some motion, as a bar
             the tilting of an end that a pressure pulls, a small residual hides a large error.
@@ -148,6 +150,7 @@ class TangentNewton:
     care: float = 0.1
     patience: int = 4
     caution: float = 0.2
+    stalls: int = 3
     room: float = 0.2
     near: float = 1e-2
     least_care: float = 1e-3
@@ -156,6 +159,7 @@ class TangentNewton:
     enough: float = 0.5
     slipped: float = 1e-6
     nested: float = 1e-2
+    rescues: int = 1
     few: int = 500
     sharp: float = 1e-9
 
@@ -172,7 +176,7 @@ class TangentNewton:
                     f"{name} of TangentNewton must lie between 0 and 1, got {getattr(self, name)!r}: it is a "
                     f"ratio, by default {getattr(TangentNewton, name)}"
                 )
-        for name in ("max_steps", "max_products", "patience", "few"):
+        for name in ("max_steps", "max_products", "patience", "stalls", "rescues", "few"):
             check_count(getattr(self, name), f"{name} of TangentNewton")
 
     def solve(
@@ -278,7 +282,8 @@ class _Run:
         residuals, method, history = state.evaluation.residuals, self.method, state.history
         if state.near is not None and residuals.within(method.tolerance):
             return NonlinearEquilibrium(state.evaluation, state.near, state.effort)
-        if len(history) >= method.max_steps or not residuals.worst < 1e6:
+        vain = state.pace.stalls >= method.stalls and residuals.worst > method.near
+        if vain or len(history) >= method.max_steps or not residuals.worst < 1e6:
             raise ConvergenceError(
                 f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
                 f"{counted(len(history), 'step')}: {history[-1] if history else 'no step'}: "
@@ -383,7 +388,7 @@ class _Run:
 
         Where nothing else holds a tool they are as if they did not give.
         """
-        solver = self._whole(evaluation)
+        solver = self._whole(evaluation, near)
         if evaluation.load.is_sprung:
             given_way = evaluation.linearised(self.timer, None, springs=False)
             own = step[: len(evaluation.at.multiplier)]
@@ -394,11 +399,17 @@ class _Run:
                 safe_log(_LOG.info, "springs alone hold a tool: %s", failure)
         return whole_step(near.system, evaluation.at.multiplier, step, solver), near
 
-    def _whole(self, evaluation: ResidualState) -> FaceNewton:
-        """Return the solver of contact as a whole: where forces are known a failure cuts the load step."""
-        if not self._forces_known(evaluation):
-            return FaceNewton(self.method.nested)
-        return FaceNewton(self.method.nested, max_products=self.method.max_products, doubts=False)
+    def _whole(self, evaluation: ResidualState, near: Linearisation) -> FaceNewton:
+        """Return the solver of contact as a whole: soon given up where the load step may be cut.
+
+        So it may where forces are known, and where loads have softened the bodies.
+        """
+        method = self.method
+        if not self._forces_known(evaluation) and not near.system.softened:
+            return FaceNewton(method.nested)
+        return FaceNewton(
+            method.nested, max_products=method.max_products, doubts=False, max_rescues=method.rescues
+        )
 
     def _damped(self, state: _State, moved: Vector, change: Vector, turned: Vector) -> Damped[ResidualState]:
         """Return the end of a step as long as cells allow, or a better point of it. Collective.
