@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from pathlib import Path
+from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit
 
 
 def available_memory(table: Path = Path("/proc/meminfo")) -> float | None:
@@ -11,11 +12,26 @@ def available_memory(table: Path = Path("/proc/meminfo")) -> float | None:
 
     `table`: where Linux lists its memory.
     """
+    return _listed(table, "MemAvailable")
+
+
+def addressable_memory(status: Path = Path("/proc/self/status")) -> float | None:
+    """Return how much more this process may address, [bytes]; None without a limit such as ``ulimit -v``.
+
+    `status`: where Linux says what the process has.
+    """
+    limit, _ = getrlimit(RLIMIT_AS)
+    taken = _listed(status, "VmSize")
+    return None if limit == RLIM_INFINITY or taken is None else max(limit - taken, 0.0)
+
+
+def _listed(table: Path, wanted: str) -> float | None:
+    """Return a size that Linux lists in kB, [bytes]."""
     if not table.is_file():
         return None
     for line in table.read_text().splitlines():
         name, _, size = line.partition(":")
-        if name == "MemAvailable":
+        if name == wanted:
             return 1024.0 * float(size.split()[0])
     return None
 

@@ -31,6 +31,7 @@ from fenics_contact.errors import (
     InvalidInputError,
     MissingRequirementError,
 )
+from fenics_contact.errors.memory import naming_memory
 from fenics_contact.output.files import OutputError
 from fenics_contact.output.result import listed_forces, scales_of
 from fenics_contact.output.tables import rounded
@@ -219,7 +220,8 @@ def report_error(error: BaseException, comm: MPI.Comm) -> ExitCode:
         if comm.size > 1:
             os._exit(int(code))  # without waiting for others, whose position is unknown
     elif not known:
-        write_stderr("".join(traceback.format_exception(error)))
+        named = naming_memory(error)
+        write_stderr("".join(traceback.format_exception(error)) if named is error else f"error: {named}\n")
         if comm.size > 1:
             comm.Abort(int(code))
     return code

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI
-from fenics_contact._base.memory import available_memory
+from fenics_contact._base.memory import addressable_memory, available_memory
 from fenics_contact._base.sparse import factor_bytes, prefers_explicit
 from fenics_contact._scene.pairs import Surface
 from fenics_contact.errors import InvalidInputError, together
@@ -197,16 +197,23 @@ class Fit:
         if limit is None and _unknowns(scene) <= small:
             return cls()
         machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
-        share = machine.size / comm.size
+        ranks, share = machine.size, machine.size / comm.size
         machine.Free()
         with together(comm):
             parts = Subdomains.of(scene, partitions)
             fast = expected_memory(scene, parts, comm.size)
             compact = expected_memory(scene, parts, comm.size, compact=True)
-            left = limit or available_memory()
+            left = limit or _left(ranks)
         each = comm.allgather((np.inf if left is None else left / share, left, share))
         _, left, share = min(each, key=lambda one: one[0])
         return cls(left, share * fast, share * compact)
+
+
+def _left(ranks: int) -> float | None:
+    """Return what a machine has left for its ranks, each of which may have a limit of its own, [bytes]."""
+    own = addressable_memory()
+    known = [available_memory(), None if own is None else ranks * own]
+    return min((size for size in known if size is not None), default=None)
 
 
 def require_memory(

@@ -9,6 +9,7 @@ from fenics_contact.errors.kinds import (
     InvalidInputError,
     LoadStepError,
     MissingRequirementError,
+    OutOfMemoryError,
     RemoteError,
     UserCodeError,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "InvalidInputError",
     "LoadStepError",
     "MissingRequirementError",
+    "OutOfMemoryError",
     "RemoteError",
     "UserCodeError",
     "agree",

@@ -44,6 +44,10 @@ class MissingRequirementError(FenicsContactError, ImportError):
     """A library that the package needs is missing or has an unsupported version."""
 
 
+class OutOfMemoryError(FenicsContactError, MemoryError):
+    """The machine, or a limit such as that of ``ulimit -v``, has no more memory."""
+
+
 class ForkedProcessError(FenicsContactError, RuntimeError):
     """A computation in a process that was forked from one that had computed already."""
 

@@ -35,6 +35,7 @@ from fenics_contact.errors.kinds import (
     failure,
     safe_log,
 )
+from fenics_contact.errors.memory import naming_memory
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -283,7 +284,7 @@ def together(comm: MPI.Comm, where: str = "") -> Iterator[None]:
     except GeneratorExit:
         raise
     except BaseException as caught:
-        error = caught
+        error = naming_memory(caught)
     agree(comm, error, where)
 
 
@@ -324,10 +325,13 @@ def collective(comm: MPI.Comm, where: str, *, closed: bool = False, users: bool 
         yield
     except GeneratorExit:
         raise
-    except BaseException as error:
+    except BaseException as caught:
+        error = naming_memory(caught)
         if comm.size > 1 and not hasattr(error, _AGREED):
             wait = min(max(time.perf_counter() - begun, SHORTEST_WAIT), LONGEST_WAIT)
             agree(comm, error, where, wait=wait, users=users)
+        if error is not caught:
+            raise error from caught
         raise
     if closed:
         agree(comm, None, f"the end of {where}")
