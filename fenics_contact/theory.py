@@ -252,7 +252,8 @@ class PinContact:
 
     Attributes:
         half_angle: Half the contact angle, in radians.
-        mean_pressure: Force per unit length over the radius, [force / length²].
+        mean_pressure: Force per unit length over the radius, F / R, [force / length²]: the unit of Persson's
+            pressures. It is twice the nominal bearing pressure F / (2 R), the mean over the pin's diameter.
     """
 
     half_angle: float

@@ -112,3 +112,15 @@ def test_the_scene_file_of_the_guide_is_read() -> None:
     file = read_scene_file(tomllib.loads(text), MPI.COMM_SELF)
     assert file.title == "Pad on a floor"
     assert len(file.steps) == 4
+
+
+def test_the_design_of_the_guide_is_read() -> None:
+    """Its objective and its surfaces in place of those of the example, whose bodies it names."""
+    objective, surfaces, *_ = fences_of((GUIDE / "shape_optimisation.md").read_text(), "toml")
+    scene, _, _ = (ROOT / "demos" / "scenes" / "chain_links.toml").read_text().partition("[design]")
+    file = read_scene_file(tomllib.loads(f"{scene}\n{objective}\n{surfaces}"), MPI.COMM_SELF)
+    design = file.document.design
+    assert design is not None
+    (moved,) = design.surfaces
+    assert (moved.body, tuple(moved.net), moved.transition) == ("link 1", (7, 4), 2.0)
+    assert len(design.objective) == 3
