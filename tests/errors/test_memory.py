@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from resource import RLIM_INFINITY, RLIMIT_AS
 
 import pytest
@@ -30,7 +31,9 @@ class PetscError(RuntimeError):
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("block", [together, lambda comm: collective(comm, "a block")])
-def test_errors_of_memory_of_any_library_are_one(error: Exception, block: Callable[..., object]) -> None:
+def test_errors_of_memory_of_any_library_are_one(
+    error: Exception, block: Callable[..., AbstractContextManager[None]]
+) -> None:
     words = rf"memory does not suffice \({type(error).__name__}: .* has taken up to [\d.e+]+ GB"
     with pytest.raises(OutOfMemoryError, match=words) as raised, block(MPI.COMM_SELF):
         raise error
@@ -38,9 +41,7 @@ def test_errors_of_memory_of_any_library_are_one(error: Exception, block: Callab
     assert isinstance(raised.value, MemoryError)
 
 
-@pytest.mark.parametrize(
-    "error", [PetscError(76), OSError(errno.ENOSPC, "full"), InvalidInputError("")]
-)
+@pytest.mark.parametrize("error", [PetscError(76), OSError(errno.ENOSPC, "full"), InvalidInputError("")])
 def test_other_errors_stay_as_they_are(error: Exception) -> None:
     with pytest.raises(type(error)) as raised, together(MPI.COMM_SELF):
         raise error
