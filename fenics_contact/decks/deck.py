@@ -36,7 +36,8 @@ from fenics_contact.decks.model import Model
 from fenics_contact.decks.pair_changes import read_changes
 from fenics_contact.decks.tables import Print, PrintTable, tables_of
 from fenics_contact.decks.ties import reach_of
-from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PARAMETERS, PROCEDURES, WITHOUT_EFFECT
+from fenics_contact.decks.unknown import refuse_unknown
+from fenics_contact.decks.vocabulary import PROCEDURES, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.readers.deck_assembly import read_cards
@@ -183,21 +184,7 @@ def _read(path: Path, statics_only: bool = False) -> Deck:
     first_left = None
     if statics_only:
         cards, first_left = _leading_statics(cards)
-    for card in cards:
-        if card.name not in KNOWN and card.name not in PROCEDURES:
-            raise card.error(
-                "this card is not known: the guide lists those that are; leave it out if it has no effect"
-            )
-        if card.name == "RESTART" and "READ" in card.parameters:
-            raise card.error("states of the other program are not read: give the steps from the start")
-        strange = set(card.parameters) - PARAMETERS.get(card.name, set(card.parameters))
-        if strange:
-            raise card.error(
-                f"the parameter {min(strange)} is not read: "
-                f"{', '.join(sorted(PARAMETERS[card.name])) or 'none'} can be"
-            )
-        if card.name in NOT_YET:
-            raise card.error("this card is known, but not read yet: leave it out, or describe it in Python")
+    refuse_unknown(cards)
     try:
         builder = _Builder(path.name, cards)
         if first_left is not None:

@@ -316,7 +316,7 @@ def integration_of(
     blocks = [mesh.blocks[k] for k in np.unique(mesh.block_of[part.elements])]
     for block in blocks:
         element = block.element
-        if count := {"C3D6": 2, "C3D15": 9}.get(element.name):
+        if count := {"C3D6": 2, "C3D15": 9, "CAX3": 2, "CAX6": 9}.get(element.name):
             note(block.card, f"elements {element.name} are integrated in full, CalculiX takes {count} points")
         if element.variant and (element.variant != "R" or element.cell not in _REDUCED):
             plain = element.name.removesuffix(element.variant)

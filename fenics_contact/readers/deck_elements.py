@@ -117,6 +117,14 @@ _EDGES: dict[str, Sequence[tuple[int, int]]] = {
 _TYPE = re.compile(r"(C3D|CPS|CPE|CAX)(\d+)([RIHMT]*)")
 
 
+#: What elements of other programs are, by how their types begin.
+_OTHERS = {
+    "SPRING": ", springs,", "STRI": ", shells,", "SC": ", shells,", "S": ", shells,", "B": ", beams,",
+    "T": ", trusses,", "M3D": ", membranes,", "MASS": ", masses,", "DASHPOT": ", dashpots,", "GAP": ", gaps,",
+    "DC": ", which conduct heat,", "F3D": ", fluids,", "COH": ", cohesive ones,", "R3D": ", rigid ones,",
+}  # fmt: skip
+
+
 def element_of(card: Card) -> Element:
     """Return the type of the elements of a card."""
     name = card.required("TYPE")
@@ -125,8 +133,9 @@ def element_of(card: Card) -> Element:
     count = int(match.group(2)) if match else 0
     cell = _CELLS[3 if kind == "solid" else 2].get(count)
     if match is None or cell is None:
+        what = next((words for start, words in _OTHERS.items() if name.startswith(start)), "")
         raise card.error(
-            f"elements of type {name} have no counterpart: solid (C3D4, 6, 8, 10, 15, 20), plane (CPS, "
+            f"elements of type {name}{what} have no counterpart: solid (C3D4, 6, 8, 10, 15, 20), plane (CPS, "
             "CPE 3, 4, 6, 8) and axisymmetric ones (CAX) have; shells, beams, springs and others do not"
         )
     return Element(name, kind, cell, count, match.group(3))

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.decks import DeckError, read_deck
-from fenics_contact.gallery import block
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import quadratic, serendipity
 from tests.decks.texts import STEEL, deck, mesh_cards
 from tests.linear.columns import COLUMN
@@ -101,3 +101,14 @@ def test_axes_are_given_by_coordinates(definition: str, tmp_path: Path) -> None:
             read_deck(path)
     else:
         assert "0.0, 1.0, 0.0" in repr(read_deck(path).scene.bodies["BAR"].materials[0])
+
+
+@pytest.mark.parametrize(("element", "count"), [("CAX3", 2), ("CAX6", 9)])
+def test_triangles_of_revolution_are_noted_as_integrated_otherwise(
+    element: str, count: int, tmp_path: Path
+) -> None:
+    mesh = rectangle((1.0, 0.0), (2.0, 1.0), (1, 1), "triangle")
+    mesh = quadratic(mesh) if element == "CAX6" else mesh
+    text = mesh_cards({"BAR": mesh}, element) + STEEL + SECTION + "*BOUNDARY\nBAR_Y0, 1, 2\n" + NOTHING
+    words = f"elements {element} are integrated in full, CalculiX takes {count} points"
+    assert any(words in note for note in read_deck(deck(tmp_path, text)).notes)

@@ -25,7 +25,7 @@ WRONG = [
     ("*STATIC", "*FANCY CARD\n*STATIC", "FANCY", r"\*FANCY CARD: this card is not known: the guide lists"),
     ("BAR_X1, 1, 10.", "BAR_X9, 1, 10.", "BAR_X9", r"node set 'BAR_X9' is not there; did you mean BAR_X\d\?"),
     ("BAR_X1, 1, 10.", "99, 1, 10.", "99, 1", r"\*CLOAD: node 99 is not there: correct the number"),
-    ("TYPE=C3D8", "TYPE=S4", "TYPE=S4", r"elements of type S4 have no counterpart: solid \(C3D4"),
+    ("TYPE=C3D8", "TYPE=S4", "TYPE=S4", r"elements of type S4, shells, have no counterpart: solid \(C3D4"),
     ("TYPE=C3D8,", "", "*ELEMENT", r"\*ELEMENT: needs the parameter TYPE=, got ELSET=BAR: add it"),
     (
         "1, 1, 5, 7, 3, 2, 6, 8, 4",
@@ -72,7 +72,7 @@ WRONG = [
     ("210000., 0.3", "210000., 0.6", "*MATERIAL", r"poisson_ratio must"),
     ("210000., 0.3", "210000., y", "210000., y", r"entry 2 must be a number, got 'y'"),
     ("*ELASTIC", "*ELASTIC, TYPE=HYPO", "*ELASTIC", r"TYPE=HYPO is not read: give ISO"),
-    ("*ELASTIC", "*USER MATERIAL\n1.\n*ELASTIC", "*USER", r"this card is not known"),
+    ("*ELASTIC", "*USER MATERIAL\n1.\n*ELASTIC", "*USER", r"materials of user routines are not read"),
     (
         "*CLOAD\nBAR_X1, 1, 10.",
         "*DLOAD\nBAR, P7, 1.",
@@ -240,3 +240,25 @@ def test_the_command_line_runs_a_deck(tmp_path: Path, capsys: pytest.CaptureFixt
     path.write_text(GOOD.replace("*STATIC", "*FANCY"))
     assert run() == 2
     assert "model.inp, line" in capsys.readouterr().err
+
+
+def test_all_that_is_not_known_is_named_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Cards, types of elements and parameters, each once with its line, and what structures are."""
+    more = "*ELEMENT, TYPE=S4\n8, 1, 2, 3, 4\n*SHELL SECTION, ELSET=X\n1.\n*SPRING, ELSET=Y\n"
+    more += "*FANCY\n*FANCY\n"
+    text = GOOD.replace("*STEP\n", more + "*STEP\n").replace("*CLOAD\n", "*CLOAD, LOAD CASE=2\n")
+    path = deck(tmp_path, text)
+    assert cli.main(MPI.COMM_SELF, ["run", str(path), "--plan"]) == 2
+    words = capsys.readouterr().err
+    lines = path.read_text().splitlines()
+    first = 1 + lines.index("*ELEMENT, TYPE=S4")
+    assert f"line {first}: *ELEMENT: elements of type S4, shells, have no counterpart" in words
+    for card, what in (
+        ("*SHELL SECTION, ELSET=X", "shells are not solved here: mesh the part with solid elements"),
+        ("*SPRING, ELSET=Y", "springs are not read"),
+        ("*FANCY", "this card is not known: the guide lists those that are"),
+        ("*CLOAD, LOAD CASE=2", "the parameter LOADCASE is not read"),
+    ):
+        name = card.partition(",")[0]
+        assert f"{name} (line {1 + lines.index(card)} of model.inp): {what}" in words
+    assert words.count("*FANCY") == 1
