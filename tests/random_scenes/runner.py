@@ -21,16 +21,18 @@ from tests.random_scenes.corner_intervals import judge_corners
 from tests.random_scenes.deformed_judge import judge_history
 from tests.random_scenes.intervals import judge_interval
 from tests.random_scenes.judge import Outcome, Verdict, judge, judge_revolved
+from tests.random_scenes.meetings_judge import judge_meeting
 
 ROOT = Path(__file__).parents[2]
 #: A process that waits and computes nothing hangs, too, if it does so for this many times the limit.
 PATIENCE = 40.0
 Judge = Callable[[int], Verdict]
 #: Scenes of small strain and linear materials, those of revolution, and histories of large deformations;
-#: intervals of quantities, and of scenes with corners and contrasts.
+#: intervals of quantities, and of scenes with corners and contrasts; scenes in which features meet,
+#: written in two ways.
 JUDGES: dict[str, Judge] = {
     "linear": judge, "revolved": judge_revolved, "deformed": judge_history, "intervals": judge_interval,
-    "corners": judge_corners,
+    "corners": judge_corners, "meetings": judge_meeting,
 }  # fmt: skip
 #: Begins the lines that a worker writes; libraries may write others.
 MARK = "verdict: "
