@@ -6,11 +6,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact._pairing.inside import Deepest, InsideOf, PointsInside, deepest_points
+from fenics_contact._pairing.inside import (
+    FLAT,
+    Deepest,
+    GapsAt,
+    InFacets,
+    InsideOf,
+    PointsInside,
+    deepest_points,
+    points_inside,
+)
+from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.pairs import Surface
-from fenics_contact._surfaces.facets import corner_places
+from fenics_contact._surfaces.facets import corner_places, edge_distance
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.deformed_state import DeformedState
 from fenics_contact.results.resolution import BetweenNodes
 from fenics_contact.results.state import State
@@ -19,6 +30,18 @@ from fenics_contact.results.state import State
 SHARE = 0.1
 #: The same where nothing presses at nodes: a contact that would be missed as a whole.
 ALONE = 0.01
+#: Local coordinates nearer to the edge of a facet than this may belong to its neighbours.
+EDGE = 0.02
+#: Part of what lies deeper inside a facet than its nodes that does not press. The nodes of a facet are
+#: stiffer than the spot that they stand for: forces are nearest to Hertz's with two thirds.
+RELIEF = 2.0 / 3.0
+#: Part of the whole depth that must be left beyond that, where a node is open and where all press: they
+#: press in then by less than a third and a sixth of what they miss. Where nodes find more of a contact, its
+#: pressures are better without.
+LEFT, LEFT_CLOSED = 0.1, 0.2
+#: Reliefs that are as near to those of their forces as this are kept.
+ENOUGH = 0.8
+TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +52,10 @@ class Missed:
         number: Of the pair.
         deepest: The deepest points of these facets.
         points: What they meet, undeformed where displacements are small.
+        bulge: By how much gaps are smaller than those between nodes, shape (n,), [length].
+        pressed_in: How far they are pressed in compared with nodes around, shape (n,), [length].
+        facets: Corners of the facets, shape (n, corners).
+        near: Distances below which points of different facets are the same, shape (n,), [length].
         places: Where they are, shape (n, dim), [length].
         moved: How far surfaces move against each other, [length].
     """
@@ -36,6 +63,10 @@ class Missed:
     number: int
     deepest: Deepest
     points: PointsInside
+    bulge: np.ndarray
+    pressed_in: np.ndarray
+    facets: np.ndarray
+    near: np.ndarray
     places: np.ndarray
     moved: float
 
@@ -99,10 +130,13 @@ def _deepest(
     ends = corner_places(inside.slave.corners)
     local = np.concatenate([deepest.local, np.tile(ends, (len(deepest.facet), 1))])
     every = np.concatenate([deepest.facet, np.repeat(deepest.facet, len(ends))]), local
-    before, after = undeformed.at(*every).distance, gaps_at(*every)
-    met = np.isfinite(before) & np.isfinite(after)
-    closed = float(np.abs(before[met] - after[met]).max(initial=0.0))
-    return Missed(number, deepest, points, places, closed)
+    opened_at = _opened(inside, undeformed, displaced)
+    moved = np.abs(opened_at(*every))
+    closed = float(moved[np.isfinite(moved)].max(initial=0.0))
+    pressed_in = inside.pressed_in(deepest.facet, deepest.local, opened_at)
+    bulge = inside.bulge(deepest.facet, deepest.local, gaps_at)
+    facets, near = inside.slave.facets[deepest.facet], EDGE * inside.sizes[deepest.facet]
+    return Missed(number, deepest, points, bulge, pressed_in, facets, near, places, closed)
 
 
 def _near(state: State, inside: InsideOf, number: int) -> np.ndarray:
@@ -136,7 +170,147 @@ def _displaced(state: State, inside: InsideOf, facets: np.ndarray) -> np.ndarray
         return displaced
     master = inside.pair.master
     other = master.body if isinstance(master, Surface) else getattr(master, "name", "")
-    for name in {inside.pair.slave.body, other} & set(scene.bodies):
+    for name in sorted({inside.pair.slave.body, other} & set(scene.bodies)):  # on all ranks alike
         nodes = inside.numbers.global_nodes(name, np.arange(scene.bodies[name].mesh.n_nodes))
         displaced[nodes] = nodal_mean_at(decomposition, state.torn_displacement, nodes)[:, : scene.dim]
     return displaced
+
+
+class InsideFacets:
+    """Points of a system that go inside facets of its slaves, where a state misses contact.
+
+    Such a point stands for a node of its facet, whose row it takes: constraints stay as many as they are.
+    That is an open node, else the one that presses least; if it lies in the master then, its row comes back.
+    """
+
+    def __init__(self, at_nodes: ContactPoints) -> None:
+        """Start with all points at their nodes."""
+        self._at_nodes = at_nodes
+        self._stay = np.zeros(at_nodes.count, dtype=bool)
+
+    def after(self, state: State) -> ContactPoints | None:
+        """Return other points than those of a state, None where it misses nothing more. Collective."""
+        decomposition, contact = state.torn.decomposition, state.contact
+        known = InFacets.of(contact.points)
+        needed = np.isin(known.point, _needed_nodes(state, self._at_nodes))
+        self._stay[known.point[needed]] = True
+        kept, busy = known.part(~needed), self._stay.copy()
+        found = [replace(kept, relief=_relieved(state, kept))]
+        busy[known.point] = True
+        for number in range(len(state.scene.contacts)):
+            if self._is_found(state, number):
+                continue
+            missed = between_nodes(state, number)
+            if missed is not None:
+                found.append(_pressing(state, missed, busy))
+        places = InFacets.join(found)
+        if len(places.point) == len(known.point) and np.array_equal(places.relief, known.relief):
+            return None
+        with together(decomposition.comm):
+            fixed, axes = decomposition.fixed, decomposition.axes
+            return points_inside(state.scene, self._at_nodes, places, fixed, axes)
+
+    @staticmethod
+    def _is_found(state: State, number: int) -> bool:
+        """Return whether two bodies touch: where some of their nodes or means press, no others do."""
+        pressing = state.contact.normal_force[state.contact.on_pair(number)] > 0.0
+        return isinstance(state.scene.contacts[number].master, Surface) and bool(pressing.any())
+
+
+def _pressing(state: State, missed: Missed, busy: np.ndarray) -> InFacets:
+    """Return points inside facets that a pair misses; marks them as `busy`, shape (n_points,)."""
+    contact, points = state.contact, state.contact.points
+    mine = contact.on_pair(missed.number)
+    least = (SHARE if contact.normal_force[mine].any() else ALONE) * missed.moved
+    depth = missed.deepest.missed
+    total = depth + missed.pressed_in
+    relief = RELIEF * np.minimum(missed.bulge, total)
+    has = [] if points.slave_facet is None else points.slave_facet[mine]
+    excess = np.where(np.isin(missed.deepest.facet, has), 0.0, depth - relief)
+    chosen, much = list[tuple[int, int]](), excess > LEFT_CLOSED * total
+    for entry in _apart(missed, (excess > LEFT * total) & (depth > least)):
+        point = _free_point(missed, entry, contact, busy, may_press=bool(much[entry]))
+        if point >= 0:
+            chosen.append((entry, point))
+    entries, which = np.array(chosen, dtype=np.int64).reshape(-1, 2).T
+    return InFacets(which, missed.deepest.facet[entries], missed.deepest.local[entries], relief[entries])
+
+
+def _relieved(state: State, kept: InFacets) -> np.ndarray:
+    """Return the reliefs of points inside facets that belong to their forces, (k,), [length]. Collective.
+
+    A force that presses its point in by c belongs to RELIEF / (1 − RELIEF) c. Where bodies give way, a point
+    begins with more; between it and the relief at which it has no force, c is linear.
+    """
+    points, comm = state.contact.points, state.torn.decomposition.comm
+    pressed_in, wanted = np.zeros(len(kept.point)), RELIEF / (1.0 - RELIEF)
+    for number in np.unique(points.pair[kept.point]):
+        mine = np.flatnonzero(points.pair[kept.point] == number)
+        inside = InsideOf.of(state.scene, state.scene.contacts[int(number)])
+        displaced = _displaced(state, inside, mine)
+        at = kept.facet[mine], kept.local[mine]
+        with together(comm):
+            pressed_in[mine] = inside.pressed_in(*at, _opened(inside, inside, displaced))
+    pressed_in = comm.bcast(pressed_in)
+    open_ = kept.relief / RELIEF
+    new = wanted * pressed_in * open_ / np.maximum(open_ - kept.relief + wanted * pressed_in, TINY)
+    return np.where(new < ENOUGH * kept.relief, new, kept.relief)
+
+
+def _opened(inside: InsideOf, undeformed: InsideOf, displaced: np.ndarray) -> GapsAt:
+    """Return by how much gaps have opened at points of facets, not finite where these do not meet."""
+
+    def opened_at(facet: np.ndarray, local: np.ndarray) -> np.ndarray:
+        after, before = inside.at(facet, local).gap(displaced), undeformed.at(facet, local).distance
+        met = np.isfinite(after) & np.isfinite(before)
+        return np.where(met, np.where(met, after, 0.0) - np.where(met, before, 0.0), np.inf)
+
+    return opened_at
+
+
+def _needed_nodes(state: State, at_nodes: ContactPoints) -> np.ndarray:
+    """Return the points inside facets whose nodes now lie in the master, shape (k,). Collective."""
+    points = state.contact.points
+    which = points.are_inside
+    if not len(which):
+        return which
+    decomposition, own = state.torn.decomposition, at_nodes.part(which)
+    nodes = np.flatnonzero(np.diff(own.jump.tocsc().indptr))
+    displaced = np.zeros((decomposition.tearing.n_nodes, decomposition.tearing.components))
+    displaced[nodes] = nodal_mean_at(decomposition, state.torn_displacement, nodes)
+    closing = np.einsum("nd,nd->n", own.normal, own.relative(displaced))
+    gap = own.gap + closing
+    return np.asarray(which[gap < -SHARE * np.abs(closing)])
+
+
+def _apart(missed: Missed, chosen: np.ndarray) -> list[int]:
+    """Return those of the chosen entries that miss most among their neighbours, deepest first."""
+    deepest, facets, depth = missed.deepest, missed.facets, missed.deepest.missed
+    order = np.lexsort((deepest.facet, -np.round(depth / depth.max(), 6)))
+    found: list[int] = []
+    for entry in order[chosen[order]]:
+        around = np.isin(facets, facets[entry]).any(axis=1)
+        at_edge = edge_distance(deepest.local[[entry]], facets.shape[1])[0] < EDGE
+        deeper = depth[around].max() > (1.0 + FLAT) * depth[entry]
+        away = np.linalg.norm(missed.places[found] - missed.places[entry], axis=1)
+        if not (at_edge and deeper) and away.min(initial=np.inf) > missed.near[entry]:
+            found.append(int(entry))
+    return found
+
+
+def _free_point(
+    missed: Missed, entry: int, contact: ContactResult, busy: np.ndarray, *, may_press: bool
+) -> int:
+    """Return the point of a node of a facet that one inside it can stand for, busy then; −1 where none can.
+
+    Of open nodes the nearest one, else, where it `may_press`, the one that presses least.
+    """
+    busy_now = busy if may_press else busy | (contact.normal_force > 0.0)
+    mine = np.flatnonzero((contact.points.pair == missed.number) & ~busy_now)
+    weight = np.asarray(missed.points.own[[entry]][:, contact.points.slave[mine]].todense()).ravel()
+    mine, weight = mine[weight > 0.0], np.round(weight[weight > 0.0], 6)
+    if not len(mine):
+        return -1
+    point = int(mine[np.lexsort((-weight, contact.normal_force[mine]))[0]])
+    busy[point] = True
+    return point

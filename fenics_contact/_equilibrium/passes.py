@@ -41,11 +41,15 @@ class Passes:
         except ConvergenceError as failure:
             steps = continued(self.history, failure.history, self._products)
             raise ConvergenceError(str(failure), steps) from failure
-        solution = _solution(state)
+        self.add(state)
+        return state
+
+    def add(self, state: LinearState) -> None:
+        """Count a state that was solved, from which the next pass starts."""
+        self._state, solution = state, _solution(state)
         self.history = continued(self.history, solution.history, self._products)
         self._products += solution.products
         self.count += 1
-        return state
 
     def remark(self, words: str) -> None:
         """Add words to the note of the last step."""

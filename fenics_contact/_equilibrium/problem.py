@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -14,9 +14,11 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
+from fenics_contact._equilibrium.between_nodes import InsideFacets
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
 from fenics_contact._equilibrium.other_rows import has_rows_of, on_rows_of, with_kept
+from fenics_contact._equilibrium.passes import Passes
 from fenics_contact._equilibrium.starts import (
     CoarseStart,
     checked_start,
@@ -27,6 +29,7 @@ from fenics_contact._equilibrium.starts import (
 from fenics_contact._equilibrium.static_admissibility import check_held
 from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact._equilibrium.warnings import ContactWarnings
+from fenics_contact._pairing.inside import InFacets, points_inside
 from fenics_contact._scene.memory import Fit
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.plan import SolverKind, choose_solver
@@ -38,7 +41,7 @@ from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.same_input import check_same_input
-from fenics_contact.feti.torn import TornSystem, build_torn_system, check_apart
+from fenics_contact.feti.torn import TornSystem, build_torn_system, check_apart, with_points
 from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.qp.solve import DualSolver
@@ -100,12 +103,63 @@ class LinearEquilibria:
                 check_held(torn)
         if self._solver is None and kind is SolverKind.DIRECT:
             return self._directly(torn, known)
+
+        def solved(
+            system_of: TornSystem, first: State | CoarseStart | None, reusable: State | None
+        ) -> LinearState:
+            return self._solved(
+                system_of, kind, tolerance, start=first, before=before, known=reusable, design=design
+            )
+
+        state = solved(torn, start, known)
+        if design or scene.torsion or not scene.contacts:
+            return state
+        return self._with_points_inside(state, before, solved)
+
+    def _with_points_inside(
+        self,
+        state: LinearState,
+        before: State | CarriedState | None,
+        solved: Callable[[TornSystem, State | CoarseStart | None, State | None], LinearState],
+        most: int = 4,
+    ) -> LinearState:
+        """Return the state in which facets press that lie between nodes in a master. Collective.
+
+        `most`: how often other points are looked for; what a state still misses is a warning.
+        """
+        torn, passes = state.torn, Passes(lambda system_of, last: solved(system_of, last, None), None)
+        passes.add(state)
+        inside = InsideFacets(torn.points)
+        for _ in range(most):
+            with self._timer.phase("state"):
+                points = inside.after(state)
+            if points is None:
+                break
+            with self._timer.phase("assemble"):
+                others = with_points(torn, points)
+                if before is not None:
+                    others = others.with_slip_from(*self._slip_origin(before, others))
+            state = passes.run(others)
+        return state if passes.count == 1 else passes.answer(state)
+
+    def _solved(
+        self,
+        torn: TornSystem,
+        kind: SolverKind,
+        tolerance: Tolerance,
+        *,
+        start: State | CoarseStart | None,
+        before: State | CarriedState | None,
+        known: State | None,
+        design: bool,
+    ) -> LinearState:
+        """Compute the equilibrium of a system. Collective."""
         solver, reused = self._solver or default_solver(kind), known_system(known)
         # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
         if tolerance is None and (self._solver is not None or design):
             tolerance = solver.tolerance
-        if any(pair.fluid is not None or pair.slip_table is not None for pair in scene.contacts):
-            if design and before and any(pair.slip_table is not None for pair in scene.contacts):
+        if any(pair.fluid is not None or pair.slip_table is not None for pair in torn.scene.contacts):
+            if design and before and any(pair.slip_table is not None for pair in torn.scene.contacts):
                 raise InvalidInputError(
                     "derivatives by the shape with friction by slip need a single load step: give the "
                     "coefficient as a number, a function of the place or a FrictionTable"
@@ -133,9 +187,8 @@ class LinearEquilibria:
         """Return from where a system measures slip. Collective."""
         if isinstance(before, CarriedState):
             scene = before.scene_on(torn.scene)
-            return before.slip_origin(
-                build_torn_system(scene, self._decomposition, overlap=True, previous=torn)
-            )
+            was = build_torn_system(scene, self._decomposition, overlap=True, previous=torn)
+            return before.slip_origin(was if torn.points.inside is None else with_points(was, torn.points))
         if has_rows_of(before, torn):
             return before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
         was, multiplier = on_rows_of(before, torn)
@@ -185,6 +238,11 @@ class LinearEquilibria:
         if not stored:
             return self._directly(torn, known)
         with self._timer.phase("assemble"):
+            if places := InFacets.restored(stored):
+                fixed, axes = self._decomposition.fixed, self._decomposition.axes
+                with together(self._decomposition.comm):
+                    points = points_inside(scene, torn.points, places, fixed, axes)
+                torn = with_points(torn, points)
             torn = with_stored_slip(torn, stored)
         if "coefficient" in stored:
             from fenics_contact._equilibrium.slip_dependence import with_coefficients

@@ -23,6 +23,7 @@ from fenics_contact._base.fingerprint import described, differences, require_ali
 from fenics_contact._base.progress import Task
 from fenics_contact._equilibrium.other_rows import require_values_to_keep, with_kept
 from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.direct import DirectSolution
@@ -44,7 +45,7 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
     Returns ``multiplier`` λ and ``origin``, from which slip is measured, of all rows in their order, shape
     (n_rows,), ``slid``, the same for points without friction, and ``motion``, the coefficients α of the rigid
     motions; all replicated. Empty for a state that was computed without multipliers. Of bodies with nonlinear
-    materials what `stored_deformed` returns.
+    materials what `stored_deformed` returns. Of points inside facets what `InFacets.stored` returns.
     """
     if isinstance(state.solution, DirectSolution):
         return {}
@@ -60,6 +61,7 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
         "slid": torn.slid,
         "motion": np.asarray(solution.alpha),
         **held_lengths(state.scene),
+        **InFacets.of(torn.points).stored(),
         **({} if torn.fluid is None else {"wet": torn.fluid.wet}),
         **({"coefficient": torn.friction_coefficient} if _by_slip(state.scene) else {}),
     }

@@ -7,16 +7,24 @@ not have derivatives, and near their minimum they hardly change.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.checks import floats
 from fenics_contact._pairing.following import followed_nodes
-from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._pairing.points import (
+    ContactPoints,
+    NodeNumbers,
+    in_free_frames,
+    reference_axes,
+    tangent_frames,
+)
 from fenics_contact._pairing.sliding.closest import moved_surface
+from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import surface_of
@@ -41,6 +49,8 @@ GapsAt = Callable[[np.ndarray, np.ndarray], np.ndarray]
 SAMPLES = 5
 #: How often steps are halved.
 HALVINGS = 8
+#: Weight of nodes off a plane of symmetry below which a point lies on it.
+ON_PLANE = 1e-9
 #: Gaps that differ by less than this part of how much they vary in a facet are the same.
 FLAT = 1e-3
 
@@ -260,6 +270,53 @@ class InsideOf:
         rows = sp.csr_matrix((weights.ravel(), (row, nodes[node].ravel())), shape=shape)
         return (rows @ followed_nodes(self.scene)).tocsr() if self.scene.has_hanging_nodes else rows
 
+    def pressed_in(self, facet: np.ndarray, local: np.ndarray, opened_at: GapsAt) -> np.ndarray:
+        """Return by how much more gaps have opened at points than at the nodes around their facets, (n,).
+
+        `opened_at`: by how much they have opened at points of facets.
+        """
+        slave = self.slave
+        rows = slave.corners * np.arange(len(slave.facets) + 1)
+        entries = np.ones(slave.facets.size), slave.facets.ravel(), rows
+        has = sp.csr_matrix(entries, shape=(len(slave.facets), len(slave.nodes)))
+        around = ((has[facet] @ has.T @ has) > 0).astype(float)
+        around = (around - around.multiply(has[facet])).tocsr()
+        around.eliminate_zeros()
+        needed = np.unique(around.indices)
+        opened = np.zeros(len(slave.nodes))
+        opened[needed] = opened_at(*self._at_nodes(needed))
+        met = np.isfinite(opened)
+        count = around @ met.astype(float)
+        mean = around @ np.where(met, opened, 0.0) / np.maximum(count, 1.0)
+        own = opened_at(facet, local)
+        return np.where((count > 0.0) & np.isfinite(own), np.maximum(np.nan_to_num(own) - mean, 0.0), 0.0)
+
+    def _at_nodes(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return nodes, by their positions, as corners of facets: these and local coordinates."""
+        first = np.zeros(len(self.slave.nodes), dtype=np.int64)
+        first[self.slave.facets.ravel()] = np.arange(self.slave.facets.size)
+        facet, corner = np.divmod(first[nodes], self.slave.corners)
+        return facet, corner_places(self.slave.corners)[corner]
+
+    def bulge(self, facet: np.ndarray, local: np.ndarray, gaps_at: GapsAt) -> np.ndarray:
+        """Return by how much gaps at points are smaller than displacements between gaps at nodes, (n,).
+
+        `gaps_at`: gaps at points of facets.
+        """
+        slave, values = self.slave, facet_shape_values(local, self.slave.corners)
+        at_corners = slave.facets[facet]
+        nodes, weights = (at_corners, values) if slave.whole is None else shape_weights(slave, facet, values)
+        needed, place = np.unique(nodes, return_inverse=True)
+        at_nodes = gaps_at(*self._at_nodes(needed))[place.reshape(nodes.shape)]
+        between = np.einsum("nk,nk->n", weights, np.where(weights != 0.0, at_nodes, 0.0))
+        return np.asarray(between - gaps_at(facet, local))
+
+    def cut(self, facet: np.ndarray, local: np.ndarray) -> np.ndarray:
+        """Return which planes of symmetry cut the slave at points, shape (n, n_planes)."""
+        values = facet_shape_values(local, self.slave.corners)
+        off = ~self.slave.mirrored[self.slave.facets[facet]]
+        return np.asarray(np.einsum("nk,nkp->np", np.abs(values), off) < ON_PLANE)
+
     def turning(self, normals: np.ndarray) -> np.ndarray:
         """Return by how much the surfaces turn against each other over each facet, shape (n_facets,).
 
@@ -274,3 +331,97 @@ class InsideOf:
         """Widths of the facets, shape (n_facets,), [length]."""
         corners = self.slave.points[self.slave.facets]
         return np.asarray(np.linalg.norm(np.ptp(corners, axis=1), axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class InFacets:
+    """Points inside facets of slaves.
+
+    Attributes:
+        point: Numbers of contact points, shape (k,).
+        facet: The facet in which each lies, shape (k,).
+        local: Local coordinates on it, shape (k, dim − 1).
+        relief: How far it may lie in the master, shape (k,), [length].
+    """
+
+    point: np.ndarray
+    facet: np.ndarray
+    local: np.ndarray
+    relief: np.ndarray
+
+    _NAMES: ClassVar = ("point", "facet", "local", "relief")
+
+    @classmethod
+    def of(cls, points: ContactPoints) -> InFacets:
+        """Return those of contact points."""
+        which, width = points.are_inside, points.normal.shape[1] - 1
+        if points.slave_facet is None or points.slave_local is None:
+            return cls(which, which, np.zeros((0, width)), np.zeros(0))
+        relief = points.gap[which] - points.distance[which]
+        return cls(which, points.slave_facet[which], points.slave_local[which], relief)
+
+    def stored(self) -> dict[str, np.ndarray]:
+        """Return the arrays from which they are found again, none without any points."""
+        return {f"inside.{name}": getattr(self, name) for name in self._NAMES} if len(self.point) else {}
+
+    @classmethod
+    def restored(cls, stored: Mapping[str, np.ndarray]) -> InFacets | None:
+        """Return those of `stored`, None where there are none."""
+        if "inside.point" not in stored:
+            return None
+        return cls(*(stored[f"inside.{name}"] for name in cls._NAMES))
+
+    def part(self, chosen: np.ndarray) -> InFacets:
+        """Return some of them, by indices or a mask."""
+        return InFacets(*(getattr(self, name)[chosen] for name in self._NAMES))
+
+    @classmethod
+    def join(cls, parts: Sequence[InFacets]) -> InFacets:
+        """Return those of several groups, at least one."""
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls._NAMES))
+
+
+def points_inside(
+    scene: Scene, points: ContactPoints, places: InFacets, fixed: np.ndarray, axes: LocalAxes | None
+) -> ContactPoints:
+    """Return contact points of which some lie inside facets of their slaves, all others at their nodes.
+
+    `points`: all of them at nodes; `places`: where some of them lie in place of their node; `fixed`: whether
+    a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
+    """
+    which = places.point
+    if not len(which):
+        return points
+    on_facet, relief = np.full(points.count, -1), np.zeros(points.count)
+    local, none = np.zeros((points.count, places.local.shape[1])), np.zeros(len(which), dtype=np.int64)
+    on_facet[which], local[which], relief[which] = places.facet, places.local, places.relief
+    found = replace(points, inside=points.own, slave_facet=on_facet, slave_local=local)
+    found = _put(found, scene, which)
+    nearest, of_master = points.axes.copy(), points.facet.copy()
+    nearest[which], of_master[which] = reference_axes(found.normal[which]), none - 1
+    tangents = tangent_frames(found.normal, nearest)
+    found = replace(found, axes=nearest, tangents=tangents, facet=of_master, gap=found.gap + relief)
+    return in_free_frames(found, fixed, axes)
+
+
+def _put(points: ContactPoints, scene: Scene, which: np.ndarray) -> ContactPoints:
+    """Return points of which some measure the distance inside facets of their slaves."""
+    assert points.slave_facet is not None
+    assert points.slave_local is not None
+    own, master, symmetric = points.own.tolil(), points.master.tolil(), points.symmetric.copy()
+    normal, gap, distance = points.normal.copy(), points.gap.copy(), points.distance.copy()
+    tilted, dim = None if points.tilted is None else points.tilted.copy(), points.normal.shape[1]
+    for number in np.unique(points.pair[which]):
+        chosen = which[points.pair[which] == number]
+        inside = InsideOf.of(scene, scene.contacts[int(number)])
+        at = points.slave_facet[chosen], points.slave_local[chosen]
+        met, cut = inside.at(*at), inside.cut(*at)
+        own[chosen], master[chosen], normal[chosen] = met.own, met.master, met.normal
+        gap[chosen] = distance[chosen] = met.distance
+        symmetric[chosen] = cut[:, :dim]
+        if tilted is not None and inside.slave.planes is not None:
+            tilted[chosen] = cut[:, dim:, None] * inside.slave.planes[dim:]
+    return replace(
+        points, inside=own.tocsr(), master=master.tocsr(), normal=normal, gap=gap, distance=distance,
+        symmetric=symmetric, tilted=tilted,
+    )  # fmt: skip

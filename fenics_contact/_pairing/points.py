@@ -65,6 +65,10 @@ class ContactPoints:
             a plane does not cut a point, shape (n, n_planes, dim); None: the scene has none.
         turns: Rotations R of the master's displacement in that of the slave less R times that of the master,
             between the sides of sectors, shape (n, dim, dim); None: there are none.
+        inside: `own` where some points lie inside a facet of the slave in place of their node, where a master
+            that is narrower than the cells presses, shape (n, n_nodes); None: all lie at their nodes.
+        slave_facet: Which facet that is, −1 for points at nodes, shape (n,); None: all are.
+        slave_local: Local coordinates on it, shape (n, dim − 1); None likewise.
     """
 
     pair: np.ndarray
@@ -84,6 +88,9 @@ class ContactPoints:
     length: np.ndarray | None = None
     tilted: np.ndarray | None = None
     turns: np.ndarray | None = None
+    inside: sp.csr_matrix | None = None
+    slave_facet: np.ndarray | None = None
+    slave_local: np.ndarray | None = None
 
     @property
     def sizes(self) -> np.ndarray:
@@ -115,6 +122,11 @@ class ContactPoints:
         order = np.argsort(nodes)
         return nodes[order], np.concatenate([values[mine], values[other.row]])[order]
 
+    @property
+    def are_inside(self) -> np.ndarray:
+        """Numbers of the points that lie inside a facet of the slave, shape (k,)."""
+        return np.flatnonzero(np.zeros(0) if self.slave_facet is None else self.slave_facet >= 0)
+
     @cached_property
     def jump(self) -> sp.csr_matrix:
         """Weights of the nodes in slave minus master displacement, shape (n, n_nodes)."""
@@ -123,6 +135,8 @@ class ContactPoints:
     @property
     def own(self) -> sp.csr_matrix:
         """Weights of the nodes in the slave's displacement, shape (n, n_nodes)."""
+        if self.inside is not None:
+            return self.inside
         entries = np.ones(self.count), self.slave, np.arange(self.count + 1)
         return sp.csr_matrix(entries, shape=self.master.shape)
 

@@ -340,6 +340,7 @@ class TornSystem:
         _, here, there = np.intersect1d(mine, theirs, return_indices=True)
         gap = points.gap.copy()
         gap[here] = finer.gap[there]
+        gap[points.are_inside] = points.gap[points.are_inside]
         return gap
 
     def with_gap(self, gap: np.ndarray) -> TornSystem:
@@ -497,8 +498,7 @@ def build_torn_system(
             for mesh, earlier in zip(decomposition.meshes, known, strict=True)
         )  # fmt: skip
     with together(comm):
-        prescribed, axes = prescribed_along(scene, decomposition.tearing)
-        right = decomposition.gluing.right_side(prescribed, axes)
+        prescribed, _ = prescribed_along(scene, decomposition.tearing)
         free = free_motions(scene, decomposition.tearing)
     alike = previous if previous is not None and _meets_alike(scene, decomposition, previous) else None
     if alike is not None and alike.driven_as(prescribed):
@@ -506,12 +506,30 @@ def build_torn_system(
         system = replace(alike, scene=scene, subdomains=subdomains, fluid=None)
     else:
         system = _joined(scene, decomposition, subdomains, overlap, previous, prescribed)
+    return _with_right_sides(system, prescribed, free)
+
+
+def with_points(torn: TornSystem, points: ContactPoints) -> TornSystem:
+    """Return a system without fluid in which slip begins anew, with other contact points. Collective."""
+    scene, decomposition = torn.scene, torn.decomposition
+    prescribed, _ = prescribed_along(scene, decomposition.tearing)
+    system = _with_rows(
+        scene, decomposition, torn.subdomains, (points, torn.ties), torn.numbering, prescribed,
+        constraints=torn.constraints,
+    )  # fmt: skip
+    return _with_right_sides(system, prescribed, free_motions(scene, decomposition.tearing))
+
+
+def _with_right_sides(system: TornSystem, prescribed: np.ndarray, free: FreeMotions) -> TornSystem:
+    """Return a system with what its rows measure at rest and under supports. Collective."""
+    scene, decomposition, comm = system.scene, system.decomposition, system.decomposition.comm
+    glued = decomposition.gluing.right_side(prescribed, decomposition.axes)
     with together(comm):
         soft = None if system.closures is None else system.closures.curve >= 0
         gap = gap_with_room(system.relations[1], decomposition.fixed, prescribed, soft) - system.reach
     supported = np.concatenate([relation.of_supports(prescribed) for relation in system.measured])
     tied, slip = np.zeros(system.relations[0].count), np.zeros(system.tangential_rows.size)
-    supported = np.concatenate([np.zeros(len(right)), supported])
+    supported = np.concatenate([np.zeros(len(glued)), supported])
     owned = system.numbering.owned
     if scene.preloads:
         drawn = shortening_columns(scene, system.relations[0])
@@ -522,7 +540,7 @@ def build_torn_system(
         with together(comm):
             system.constraints.require_consistent(scene.constraints, prescribed, free.columns)
         tied = np.concatenate([tied, system.constraints.right(scene.constraints)])
-    right = np.concatenate([right, tied, gap, slip]) - supported
+    right = np.concatenate([glued, tied, gap, slip]) - supported
     slid = np.zeros((len(system.frictionless), system.components - 1))
     if free.count:
         columns = free.of_rows(decomposition.gluing.dof, system.measured)
@@ -543,6 +561,7 @@ def _meets_alike(scene: Scene, decomposition: Decomposition, known: TornSystem) 
         for each in (scene, known.scene)
     ]
     same = scene.has_meshes_of(known.scene) and known.decomposition is decomposition
+    same = same and known.points.inside is None
     return same and rest[0] == rest[1] and contacts_alike(scene, known.scene)
 
 

@@ -417,7 +417,7 @@ def on_tool(torn: TornSystem, forces: NodalForces, tool: str, about: np.ndarray)
     """Return the resultant of the contact on a rigid tool, about a point."""
     pairs = [k for k, pair in enumerate(torn.scene.contacts) if getattr(pair.master, "name", None) == tool]
     mine = np.flatnonzero(np.isin(torn.points.pair, pairs))
-    places, turned = forces.places[torn.points.slave[mine]], torn.scene.axisymmetric
+    places, turned = torn.points.own[mine] @ forces.places, torn.scene.axisymmetric
     master = torn.points.master[mine]
     carried = np.diff(master.indptr) > 0  # where the tool is, also where surfaces that give way keep apart
     places = np.where(carried[:, None], master @ forces.places, places)
@@ -667,7 +667,7 @@ def pair_resultants(
         for number, pair in enumerate(pairs):
             mine = np.flatnonzero(points.pair == number)
             point = centroid(scene, pair.slave) if about is None else point_of(about, scene.dim)
-            places = forces.places[points.slave[mine]]
+            places = points.own[mine] @ forces.places
             found.append(resultant(force[mine], places, point, pair.slave, scene.axisymmetric))
         return Resultants(kind, tuple(found), tuple(pair.place for pair in pairs))
 
