@@ -42,7 +42,8 @@ from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.torn import TornSystem, build_torn_system, check_apart, with_points
-from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
+from fenics_contact.qp.face_newton import ProjectedCG
+from fenics_contact.qp.in_turn import InTurn
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.contact import no_contact
@@ -313,7 +314,7 @@ class LinearEquilibria:
 def default_solver(kind: SolverKind) -> DualSolver:
     """Return the dual solver of a kind, with its tolerance."""
     if kind is SolverKind.FACE_NEWTON:
-        return FaceNewton()
+        return InTurn()
     return ProjectedCG(tolerance=LINEAR_TOLERANCE)
 
 

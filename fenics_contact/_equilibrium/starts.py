@@ -21,6 +21,7 @@ from fenics_contact.mesh.cell_types import CELL_TYPES, shape_values
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.mesh.transfer import MeshTransfer
 from fenics_contact.qp.face_newton import FaceNewton
+from fenics_contact.qp.in_turn import InTurn
 from fenics_contact.qp.solution import DualSolution, continued
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.dual_solve import solve_dual
@@ -124,10 +125,10 @@ def solve_from_coarse(
 
     So that a start costs hardly more than none: a rescue takes more products than a solve from nothing.
     """
-    if not isinstance(start, np.ndarray) or not isinstance(solver, FaceNewton):
+    if not isinstance(start, np.ndarray) or not isinstance(solver, FaceNewton | InTurn):
         return solve_dual(system, solver, start)
     try:
-        return solve_dual(system, replace(solver, max_rescues=0), start)
+        return solve_dual(system, solver.without_rescue, start)
     except ConvergenceError as failure:
         history = failure.history
     spent = history[-1].products if history else 0

@@ -1,8 +1,8 @@
 """Solvers for the dual problem of contact: quadratic, with equilibrium, bounds and friction discs.
 
-The problem (`DualProblem`) is an operator, a coarse space and a layout; a solver (`FaceNewton`, `Smalse`,
-`ProjectedCG`) holds only its parameters; `solve` joins them to a `DualSolution` or raises. Vectors are
-distributed over the ranks of the problem's communicator.
+The problem (`DualProblem`) is an operator, a coarse space and a layout; a solver (`InTurn`,
+`FaceNewton`, `Smalse`, `ProjectedCG`) holds only its parameters; `solve` joins them to a `DualSolution` or
+raises. Vectors are distributed over the ranks of the problem's communicator.
 """
 
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fenics_contact.qp.cones import FeasibleSet, SlipLaw
     from fenics_contact.qp.face import Face
     from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG, SlidingError
+    from fenics_contact.qp.in_turn import InTurn
     from fenics_contact.qp.krylov import Stop
     from fenics_contact.qp.problem import DualProblem, FacePreconditioner
     from fenics_contact.qp.smalse import Smalse
@@ -28,6 +29,7 @@ __all__ = [
     "FaceNewton",
     "FacePreconditioner",
     "FeasibleSet",
+    "InTurn",
     "ProjectedCG",
     "Residuals",
     "SlidingError",

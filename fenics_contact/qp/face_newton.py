@@ -24,6 +24,7 @@ from fenics_contact.qp.solution import (
     SmalseMemory,
     SolverStep,
     Start,
+    StoppedError,
     apply_unless_zero,
     certify,
     iterate_fitted,
@@ -205,8 +206,8 @@ class FaceNewton:
     keeps its direction or the disc sticks. A step that is worse than the last two iterates is shortened, at
     no cost in products. Steps without progress are followed by a rescue from the best iterate so far, by
     proximal points, whose convex potential a line search descends (`qp.rescue`), or without a preconditioner
-    by SMALSE; the history reports whether the active set cycled or the residual stagnated. No result is
-    accepted before its residuals are recomputed.
+    by SMALSE where bodies float; the history reports whether the active set cycled or the residual
+    stagnated. No result is accepted before its residuals are recomputed.
 
     Attributes:
         tolerance: Every residual of `Residuals` ends below it.
@@ -218,7 +219,7 @@ class FaceNewton:
         care: Factor on the inner tolerance after each step without progress beyond ``careful_after``: where
             forces vanish in the limit, residuals relative to them do not measure the accuracy of the gaps.
         careful_after: Steps without progress that do not tighten the inner tolerance yet.
-        rescue: Parameters of the fallback of problems without a preconditioner.
+        rescue: Parameters of SMALSE in rescues.
         rescue_products: Products that a rescue may use; doubled each time Newton fails again.
         repairable: Relative imbalance up to which a rescue starts from the best iterate: proximal points
             preserve equilibrium and do not restore it. From more the first iterate is the start.
@@ -259,6 +260,11 @@ class FaceNewton:
         """Return the solver with another tolerance."""
         return replace(self, tolerance=tolerance)
 
+    @property
+    def without_rescue(self) -> FaceNewton:
+        """The method that stops where it would need a rescue."""
+        return replace(self, max_rescues=0)
+
     def run(self, problem: DualProblem, start: Start) -> DualSolution:
         """Solve from ``start``; called by `solve`. Collective.
 
@@ -295,6 +301,13 @@ class _State:
     last_rescue: _LastRescue | None = None
     exact_at: float = 1.0  # residual where the product was last computed in double precision
     answer: Certificate | None = None  # the certified solution, once there is one
+    least: Iterate | None = None  # the iterate with the least residual of all, None before the first step
+
+    def seen(self, iterate: Iterate) -> Iterate:
+        """Return the least of an iterate and all before it."""
+        least = self.least or self.best
+        now = iterate.residuals.worst_in_scales_with(least.residuals)
+        return iterate if now < least.residuals.worst_in_scales_with(iterate.residuals) else least
 
 
 @dataclass(frozen=True, eq=False)
@@ -345,7 +358,10 @@ class _Run:
         iterate, answer = self._checked(newton.iterate, state.exact_at)
         exact_at = state.exact_at if iterate is newton.iterate else iterate.residuals.worst
         newton = replace(newton, iterate=iterate)
-        state = replace(state, newton=newton, history=history, answer=answer, exact_at=exact_at)
+        least = state.seen(iterate)
+        state = replace(
+            state, newton=newton, history=history, answer=answer, exact_at=exact_at, least=least
+        )
         if answer is not None:
             return state
         lost = without_contact(history, self.parameters.patience)
@@ -383,7 +399,7 @@ class _Run:
             budget = 2 * last.budget
         left = max(self.parameters.max_products - operator.products, 1)
         begin = Start(origin, operator, state.memory, cold=False)
-        outcome = self.rescue(begin, min(budget, left), further=again)
+        outcome = self.rescue(begin, min(budget, left), further=again, number=state.rescues)
         line = self._line(state, origin, outcome)
         self.start.reached(line)
         iterate, answer = self._checked(outcome.iterate, state.exact_at)
@@ -392,6 +408,7 @@ class _Run:
             state,
             newton=replace(state.newton, iterate=iterate),
             best=iterate,
+            least=state.seen(iterate),
             memory=outcome.memory,
             history=(*state.history, line),
             since_best=0,
@@ -402,7 +419,7 @@ class _Run:
 
     def _fail(self, state: _State) -> NoReturn:
         """Raise the error of a solve that is exhausted. Collective."""
-        failure = ConvergenceError(self._failed(state), state.history)
+        failure = StoppedError(self._failed(state), state.history, state.least or state.best)
         if self.parameters.doubts and state.rescues >= self.parameters.doubted_rescue:
             try:
                 self._require_enough_sliding()
@@ -448,7 +465,7 @@ class _Run:
         parameters, products, history = self.parameters, self.start.operator.products, state.history
         up = [products >= parameters.max_products, len(history) >= parameters.max_steps]
         more = [f"raise {name}" for name, used in zip(("max_products", "max_steps"), up, strict=True) if used]
-        best = state.best.residuals.worst
+        best = (state.least or state.best).residuals.worst
         last = history[-1] if history else "none of them was left for a step"
         reached = (
             f"face Newton needs residuals below {parameters.tolerance:.1e}, got after {products} products "
@@ -460,7 +477,7 @@ class _Run:
             why = f"all {history[-1].slip} discs slip, and friction may not suffice for any equilibrium; "
         else:
             ways = [*more, "start from the solution of a neighbouring load"]
-            ways += ["loosen the tolerance if the best residual is near it", "use a FixedPoint of SMALSE"]
+            ways += ["loosen the tolerance if the best residual is near it", "use InTurn"]
             why = ""
         return f"{reached}: {why}{', '.join(ways[:-1])}, or {ways[-1]}"
 

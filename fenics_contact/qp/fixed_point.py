@@ -14,7 +14,15 @@ from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp.cones import TrescaLaw
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.solution import DualSolution, SolverStep, Start, continued, measure
+from fenics_contact.qp.solution import (
+    DualSolution,
+    Iterate,
+    SolverStep,
+    Start,
+    StoppedError,
+    continued,
+    measure,
+)
 from fenics_contact.qp.solve import DualSolver, find_equilibrium, solve
 
 
@@ -116,6 +124,7 @@ class FixedPoint:
     Attributes:
         solver: Solver of the Tresca problems.
         max_steps: Largest number of Tresca problems.
+        max_products: Give up after the Tresca problem with which that many F-products are reached.
         forcing: Tolerance of a Tresca problem relative to the last natural residual.
         loosest: Largest tolerance, that of the first Tresca problem.
         damping: What to do where the plain iteration cycles.
@@ -130,6 +139,7 @@ class FixedPoint:
 
     solver: DualSolver
     max_steps: int = 200
+    max_products: int = 1_000_000
     forcing: float = 0.1
     loosest: float = 1e-2
     damping: Damping = field(default_factory=Damping)
@@ -155,29 +165,34 @@ class FixedPoint:
         earlier: DualSolution | np.ndarray | None = None if start.cold else start.iterate.multiplier
         history: list[SolverStep] = []
         products, reached = start.operator.products, np.inf
+        best: Iterate | None = None
         for number in range(self.max_steps):
             try:
                 solution = solve(problem, slip_bound, self._inner(sequence.fraction * reached), earlier)
             except ConvergenceError as failure:
                 steps = continued(history, failure.history, products)
-                raise ConvergenceError(
+                raise StoppedError(
                     f"the Coulomb fixed point needs residuals below {self.tolerance:.1e}, but its Tresca "
                     f"problem {number} failed: {failure}",
                     steps,
+                    best or start.iterate,
                 ) from failure
             history = continued(history, solution.history, products)
             products += solution.products
             solution = _under_own_bound(problem, solution)
             reached = solution.natural_residual
+            if best is None or solution.residuals.worst < best.residuals.worst:
+                best = _iterate_of(solution)
             slip_bound, note = sequence.advance(slip_bound, solution.slip_bound, reached)
             history[-1] = replace(history[-1], note=f"{history[-1].note}; {note}")
             start.reached(replace(history[-1], residuals=solution.residuals))
             if solution.residuals.within(self.tolerance):
                 return replace(solution, iterations=len(history), products=products, history=tuple(history))
-            if sequence.exhausted:
+            if sequence.exhausted or products >= self.max_products:
                 break
             earlier = solution
-        raise ConvergenceError(self._failure(sequence, reached), history)
+        reason = self._failure(sequence, reached, products, number + 1)
+        raise StoppedError(reason, history, best or start.iterate)
 
     def _inner(self, residual: float) -> DualSolver:
         """Return the solver of the next Tresca problem, given the error that its slip bound has already."""
@@ -186,7 +201,7 @@ class FixedPoint:
         tolerance = max(0.5 * self.tolerance, min(self.loosest, self.forcing * residual))
         return self.solver.with_tolerance(tolerance)
 
-    def _failure(self, sequence: SlipBoundSequence, reached: float) -> str:
+    def _failure(self, sequence: SlipBoundSequence, reached: float, products: int, steps: int) -> str:
         needed = (
             f"the Coulomb fixed point needs a natural residual below {self.tolerance:.1e}, reached "
             f"{reached:.1e}"
@@ -197,9 +212,10 @@ class FixedPoint:
                 f"{needed}: it cycles or stagnates with every θ of {fractions}; use FaceNewton, which "
                 "updates the slip bound in every step, or give Damping smaller fractions"
             )
+        used = "max_products" if products >= self.max_products else "max_steps"
         return (
-            f"{needed} after {self.max_steps} Tresca problems: raise max_steps, or use FaceNewton, which "
-            "updates the slip bound in every step"
+            f"{needed} after {steps} Tresca problems and {products} products: raise {used}, or use "
+            "FaceNewton, which updates the slip bound in every step"
         )
 
 
@@ -214,6 +230,10 @@ def _first_slip_bound(problem: DualProblem, start: Start, margin: float = 1.1) -
         if find_equilibrium(problem.with_law(TrescaLaw(problem.layout, bound))).motion is None:
             return bound
     return margin * problem.law.bound(find_equilibrium(problem).multiplier)
+
+
+def _iterate_of(solution: DualSolution) -> Iterate:
+    return Iterate(solution.multiplier, solution.product, solution.residual, solution.residuals)
 
 
 def _under_own_bound(problem: DualProblem, solution: DualSolution) -> DualSolution:

@@ -314,6 +314,13 @@ class CountedOperator:
         self.report(self.products, None)
         return product
 
+    def anew(self) -> CountedOperator:
+        """Return the operator with its counter at zero, for another solver; reports go on from here."""
+        before = self.products
+        return CountedOperator(
+            self._operator, lambda products, residual: self.report(before + products, residual), self._exact
+        )
+
     def report(self, products: int, residual: float | None) -> None:
         """Report the number of products and the residual reached."""
         if self._report is not None:

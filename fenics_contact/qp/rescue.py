@@ -168,15 +168,18 @@ class Rescued:
 class Rescue:
     """Improves iterates that Newton's method cannot, with their slip bound temporarily fixed.
 
-    By proximal points where a preconditioner makes faces cheap; by SMALSE, which solves no face, elsewhere.
+    By proximal points; by SMALSE, which solves no face, where bodies float and no preconditioner makes faces
+    cheap.
 
     Attributes:
         problem: The dual problem.
         forcing: How accurately Newton's method solves its faces, and the tolerance of the solve.
         max_products: Largest number of F-products of the whole solve.
-        smalse: Parameters where there is no preconditioner.
+        smalse: Parameters of SMALSE.
         reduction: A rescue aims at a residual smaller by this factor.
         springs: First stiffness of the springs in units of 1/diag F: soft for Newton, stiff for the centre.
+        variety: Factors on that stiffness from the fifth rescue on, in turn: where F is singular, Newton's
+            method may lose the same way again what springs of one stiffness have gained.
         few: If a centre takes no more steps than this, the springs of the next are stiffer: constant springs
             move the centre by the same small fraction of its way to the solution each time.
         stiffer: Factor on the springs then.
@@ -193,6 +196,7 @@ class Rescue:
     smalse: Smalse
     reduction: float = 0.1
     springs: float = 10.0
+    variety: tuple[float, ...] = (10.0, 0.3, 30.0, 1.0)
     few: int = 2
     stiffer: float = 4.0
     max_steps: int = 60
@@ -201,20 +205,23 @@ class Rescue:
     face_forcing: float = 0.25
     face_loosest: float = 0.1
 
-    def __call__(self, start: Start, budget: int, *, further: bool = False) -> Rescued:
-        """Improve an iterate. Collective."""
-        limit, memory = start.operator.products + budget, start.memory
-        if self.problem.preconditioner is None and self.problem.compliance is None:
+    def __call__(self, start: Start, budget: int, *, further: bool = False, number: int = 0) -> Rescued:
+        """Improve an iterate; ``number``: of the rescue within the solve, from 0. Collective."""
+        problem, limit, memory = self.problem, start.operator.products + budget, start.memory
+        if problem.preconditioner is None and problem.compliance is None and problem.coarse.m:
             iterate, line, memory = self._by_smalse(start, limit)
         else:
-            iterate, line = self._by_proximal_points(start, limit, further)
+            factor = 1.0 if number < 4 else self.variety[(number - 4) % len(self.variety)]
+            iterate, line = self._by_proximal_points(start, factor * self.springs, limit, further)
         reached = self._improved(iterate.residuals, start.iterate.residuals, further)
         line = replace(line, products=start.operator.products, residuals=iterate.residuals)
         return Rescued(iterate, line, memory, reached)
 
-    def _by_proximal_points(self, start: Start, limit: int, further: bool) -> tuple[Iterate, SolverStep]:
+    def _by_proximal_points(
+        self, start: Start, springs: float, limit: int, further: bool
+    ) -> tuple[Iterate, SolverStep]:
         """Take Newton steps with springs, and move their centre whenever they converge. Collective."""
-        path = self._first_centre(start)
+        path = self._first_centre(start, springs)
         for number in range(self.max_steps):
             newton, line = path.steps.step(path.newton, number)
             iterate = path.point.leave(newton.iterate)
@@ -230,9 +237,9 @@ class Rescue:
                 path = self._next_centre(path, start.operator, iterate)
         return iterate, replace(line, method="proximal rescue")
 
-    def _first_centre(self, start: Start) -> _ProximalPath:
-        """Add soft springs centred at the initial forces. Collective."""
-        point = ProximalPoint.build(self.problem, start.operator, self.springs)
+    def _first_centre(self, start: Start, springs: float) -> _ProximalPath:
+        """Add springs centred at the initial forces. Collective."""
+        point = ProximalPoint.build(self.problem, start.operator, springs)
         point = point.centred(start.iterate.multiplier)
         steps = self._steps(point)
         return _ProximalPath(point, steps, steps.init(steps.at_rest(point.enter(start.iterate))))

@@ -10,7 +10,7 @@ import scipy.linalg
 
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp.cones import FeasibleSet, TrescaLaw
 from fenics_contact.qp.problem import DualProblem, Operator
 from fenics_contact.qp.reductions import Vector, global_min, global_sum
@@ -20,6 +20,7 @@ from fenics_contact.qp.solution import (
     SmalseMemory,
     SolverStep,
     Start,
+    StoppedError,
     certify,
     count_status,
     measure,
@@ -330,10 +331,12 @@ class Smalse:
                     return answer.solution(history, operator.products, state.memory)
             if operator.products >= self.max_products:
                 break
-        raise ConvergenceError(
+        answer = certify(problem, state.multiplier, operator.exactly(state.multiplier), state.residual)
+        raise StoppedError(
             f"SMALSE needs residuals below {self.tolerance:.1e}, got after {operator.products} products: "
             f"{history[-1]}; raise max_products, or loosen the tolerance",
             history,
+            answer.iterate,
         )
 
 

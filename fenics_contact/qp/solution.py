@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import LAST_PLACES
+from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp.face import classify
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.problem import CountedOperator, DualProblem, LeastSizes, Operator
@@ -341,6 +342,19 @@ class Start:
     def reached(self, step: SolverStep) -> None:
         """Report what a step of the solver has reached."""
         self.operator.report(step.products, step.residuals.worst)
+
+
+class StoppedError(ConvergenceError):
+    """A dual solver stopped before its tolerance was met.
+
+    Attributes:
+        best: The iterate with the least residual, from which another solver may go on.
+    """
+
+    def __init__(self, message: str, history: Sequence[SolverStep], best: Iterate) -> None:
+        """Store the iterate with message and history."""
+        super().__init__(message, history)
+        self.best = best
 
 
 def iterate_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha: Vector) -> Iterate:
