@@ -57,6 +57,11 @@ def test_a_rigid_block_has_the_friction_of_its_slip_over_load_steps() -> None:
     assert 2 <= len(notes) <= 6
 
 
+def test_the_slope_at_a_corner_of_a_table_is_that_beyond_it() -> None:
+    slopes = TABLE.growth(np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.3]))
+    np.testing.assert_allclose(slopes, [-2.0, -2.0, 1.0, 1.0, 0.0, 0.0])
+
+
 def test_bodies_that_give_way_agree_with_their_slips_point_by_point() -> None:
     table = SlipTable((0.0, 0.004), (0.4, 0.3))
     contact = solved(dragged_block(Coulomb(table), 6.0, shift=0.005)).contact

@@ -264,6 +264,16 @@ def test_a_constraint_alone_holds_a_body_as_far_as_it_can() -> None:
     assert state.constraints()["a x1 and b x1"].on_bodies["b"][0] == pytest.approx(-4.0, rel=1e-8)
 
 
+def test_partners_are_found_in_any_order_of_the_nodes() -> None:
+    mesh = block((0, 0, 0), (2, 1, 1), (2, 2, 2))
+    left, right = (np.unique(mesh.surfaces[side]) for side in ("x0", "x1"))
+    terms = [ConstraintTerm("a", left, "x"), ConstraintTerm("a", right[::-1], "x", -1.0)]
+    body = Body(mesh, STEEL)
+    first, other = LinearConstraint(terms, paired="translation").entries({"a": body})
+    across = mesh.points[other.nodes] - mesh.points[first.nodes]
+    np.testing.assert_allclose(across, np.tile([2.0, 0.0, 0.0], (len(left), 1)), atol=1e-14)
+
+
 RANKS = """
     from mpi4py import MPI
     import numpy as np

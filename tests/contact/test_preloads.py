@@ -36,6 +36,7 @@ from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.feti.preloads import shortening_scales
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke
+from fenics_contact.mesh.faces import vector_areas
 from fenics_contact.output import read_result
 from tests.contact.bolts import (
     BOLT,
@@ -93,6 +94,15 @@ def test_an_oblique_section_transmits_its_force_along_its_normal():
     assert section.force == pytest.approx(3.0)
     moved = {name: state.reactions()[number].force for number, name in enumerate(("z0", "z1"))}
     assert moved["z1"] == pytest.approx(-section.resultant.force, abs=1e-8)
+
+
+def test_the_area_of_an_oblique_section_is_that_across_its_normal():
+    """Between cells as high as wide the cut is a stair: 1 across the bar and 1 along it."""
+    drawn = Preload("bar", Section((0.0, 0.5, 2.0), (0.0, 0.8, 0.6)), force=1.0)
+    mesh = clamped(drawn).bodies["bar"].mesh
+    along, across = np.abs(vector_areas(mesh.points, drawn.cut(mesh).facets)).sum(axis=0)[1:]
+    assert [along, across] == pytest.approx([1.0, 1.0])
+    assert drawn.area(mesh) == pytest.approx(0.8 * along + 0.6 * across)
 
 
 def test_a_bolt_of_revolution_has_the_force_of_a_full_one():

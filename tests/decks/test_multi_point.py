@@ -47,6 +47,18 @@ def test_the_mean_rotation_of_an_end_is_given(tmp_path: Path) -> None:
     np.testing.assert_allclose(root.force, 0.0, atol=1e-7 * abs(moment))
 
 
+def test_the_mean_rotation_is_about_the_mean_displacement(tmp_path: Path) -> None:
+    """Of three corners, whose arms differ; what they move together turns nothing."""
+    turned = "*MPC\nMEANROT, 17, 17, 17, 18, 18, 18, 20, 20, 20,\n700\n"
+    shifted = step("*BOUNDARY\n700, 1, 1, 0.01\n*CLOAD\n19, 2, 40.\n")
+    _, _, moved, places = solved(tmp_path, BAR + PILOT + FIXED + turned + shifted)
+    ends, at = (np.array([each[k] for k in (17, 18, 20)]) for each in (moved, places))
+    arms, ways = at - at.mean(axis=0), ends - ends.mean(axis=0)
+    squares = np.einsum("nd,nd->n", arms[:, 1:], arms[:, 1:])
+    assert (np.cross(arms, ways)[:, 0] / squares).mean() == pytest.approx(0.01, rel=1e-8)
+    assert abs((np.cross(arms, ends)[:, 0] / squares).mean() - 0.01) > 1e-4
+
+
 def test_nodes_stay_in_planes_and_lines_and_keep_their_distance(tmp_path: Path) -> None:
     mesh = block((0, 0, 0), (4, 1, 1), (4, 2, 2))
     text = mesh_cards({"BAR": mesh}) + STEEL + SECTION + FIXED

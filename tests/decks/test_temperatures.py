@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import read_scene_file
+from fenics_contact import ThermalStrain, read_scene_file
+from fenics_contact._scene.fields import NodeValues
 from fenics_contact.decks import DeckError, read_deck, write_scene_file
-from fenics_contact.gallery import rectangle
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import TemperatureDependentElasticity
+from fenics_contact.mesh import quadratic
 from tests.decks.texts import BAR, END, FREE_TO_CONTRACT, SECTION, deck, mesh_cards, step
 
 SOFTENING = "*ELASTIC\n100000., 0., 520.\n200000., 0., 20.\n"
@@ -48,6 +50,23 @@ def test_a_temperature_that_never_changes_needs_no_table(tmp_path: Path) -> None
     (material,) = found.scene.bodies["BAR"].materials
     assert getattr(material, "young_modulus", 0.0) == pytest.approx(1.8e5)
     assert not isinstance(material, TemperatureDependentElasticity)
+
+
+def test_centres_of_quadratic_cells_have_the_temperatures_around_them(tmp_path: Path) -> None:
+    """Temperatures 20 + 100 x at the nodes of the deck, which has no centres of faces and cells."""
+    mesh = quadratic(block((0, 0, 0), (2, 1, 1), (2, 1, 1)))
+    text = mesh_cards({"BAR": mesh}) + "*MATERIAL, NAME=STEEL\n*ELASTIC\n210000., 0.3\n*EXPANSION\n1.E-5\n"
+    nodes = [line.split(",") for line in text.partition("*ELEMENT")[0].splitlines()[1:]]
+    initial = [f"{int(number)}, 20." for number, *_ in nodes]
+    now = [f"{int(number)}, {20.0 + 100.0 * float(x)}" for number, x, *_ in nodes]
+    text += SECTION + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\n" + "\n".join(initial) + "\n"
+    text += "*BOUNDARY\nBAR_X0, 1, 3\n" + step("*TEMPERATURE\n" + "\n".join(now) + "\n")
+    found = read_deck(deck(tmp_path, text))
+    (heat,) = (load for load in found.steps[0].loads if isinstance(load, ThermalStrain))
+    body = found.scene.bodies["BAR"].mesh
+    assert body.centres is not None
+    assert isinstance(heat.value, NodeValues)
+    np.testing.assert_allclose(heat.value.values, 100.0 * body.points[:, 0], atol=1e-10)
 
 
 PLATE = mesh_cards({"BAR": rectangle((0, 0), (3, 4), (3, 5))}, "CPS4")

@@ -402,3 +402,45 @@ def test_what_depends_on_more_than_the_shape_is_assembled_for_each_piece() -> No
     halves = replace(bar.mesh, regions={"left": np.arange(12), "right": np.arange(12, 24)})
     materials = {"left": STEEL, "right": IsotropicElasticity(100.0, 0.3)}
     assert matrices(Scene({"bar": Body(halves, materials)}), (3, 1, 1)) == 3
+
+
+def test_stiffnesses_that_agree_in_diagonal_trace_and_norm_alone_are_not_alike() -> None:
+    """K and 2 diag K − K: entries between nodes have the other sign, and all invariants are the same."""
+    random = np.random.default_rng(0)
+    points, root = random.uniform(size=(5, 2)), random.uniform(0.5, 1.0, (10, 10))
+    stiffness = root @ root.T
+    other = 2.0 * np.diag(np.diagonal(stiffness)) - stiffness
+    first, given, again = (
+        Kind(_Stiff(csr_matrix(each), points), np.arange(4))  # type: ignore[arg-type]
+        for each in (stiffness, other, stiffness)
+    )
+    np.testing.assert_allclose(given.size, first.size)
+    np.testing.assert_allclose(given.marks, first.marks)
+    kinds = Kinds()
+    assert kinds.place(first) == (first, None)
+    assert kinds.place(given) == (given, None)
+    assert kinds.place(again) == (first, None)
+
+
+@dataclass(eq=False)
+class _Stiff:
+    """A subdomain as far as kinds look at it."""
+
+    stiffness: csr_matrix
+    points: np.ndarray
+
+    @property
+    def mesh(self) -> _Stiff:
+        return self
+
+    @property
+    def matrix(self) -> csr_matrix:
+        return self.stiffness
+
+    @property
+    def components(self) -> int:
+        return self.points.shape[1]
+
+    @property
+    def kernel(self) -> np.ndarray:
+        return np.zeros((self.points.size, 3))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tests.mutants.copy_of_package import Mutation
 from tests.mutants.design_mutations import DESIGN_MUTATIONS, GIVEN
 from tests.mutants.large_mutations import LARGE_MUTATIONS
+from tests.mutants.unseen_mutations import UNSEEN_MUTATIONS
 
 CONIC = (
     "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"
@@ -18,6 +19,7 @@ RIGID = "tests/contact/test_rigid_surfaces.py"
 MUTATIONS = (
     *DESIGN_MUTATIONS,
     *LARGE_MUTATIONS,
+    *UNSEEN_MUTATIONS,
     Mutation(
         "bodies of revolution have no hoop strain",
         "_fem/revolution.py",

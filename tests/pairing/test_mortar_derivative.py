@@ -11,7 +11,12 @@ import pytest
 
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar import derivatives as coupling_derivative
-from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
+from fenics_contact._pairing.mortar.coupling import (
+    MortarCoupling,
+    _pseudo_inverse,
+    inverted_pulled_back,
+    mortar_coupling,
+)
 from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back, weight_derivatives
 from fenics_contact._pairing.mortar.planes import Planes
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, slopes
@@ -262,3 +267,17 @@ def test_derivatives_of_all_weights_are_those_of_reverse_mode(past: float, kinds
     np.testing.assert_allclose(
         found.rows.T @ by_weight, expected.ravel(), rtol=0, atol=1e-8 * np.abs(expected).max()
     )
+
+
+def test_the_pseudo_inverse_of_a_sliver_turns_with_it() -> None:
+    """The direction that is left out turns as the covariance changes: quotients between it and the other."""
+    rng, step = np.random.default_rng(0), 1e-7
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    covariance = (turn * [1.0, 0.5, 1e-12] @ turn.T)[None]
+    by_inverse, way = rng.standard_normal((2, 1, 3, 3))
+    way, by_inverse = way + way.transpose(0, 2, 1), by_inverse + by_inverse.transpose(0, 2, 1)
+    thin = turn[:, 2]
+    way -= (thin @ way[0] @ thin) * np.outer(thin, thin)  # it stays a sliver
+    ends = [np.sum(by_inverse * _pseudo_inverse(covariance + s * way)) for s in (step, -step)]
+    slope = np.sum(inverted_pulled_back(covariance, by_inverse) * way)
+    assert slope == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-4)
