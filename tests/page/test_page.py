@@ -17,8 +17,9 @@ from scipy.spatial.transform import Rotation
 
 from fenics_contact import State, Status, result_page, write_result, write_vtu
 from fenics_contact import _cli as cli
+from fenics_contact._page.arrays import rounded
 from fenics_contact._page.obstacles import obstacle_entries
-from fenics_contact._page.page import Page, rounded, sections, status_words
+from fenics_contact._page.page import Page, sections, status_words
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
 from fenics_contact.output import ResultSeries
 from fenics_contact.output.result import readable, result_record
