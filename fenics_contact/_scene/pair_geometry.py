@@ -278,14 +278,17 @@ class PairGeometry:
 
     def __str__(self) -> str:
         """Describe it in one line."""
-        parts = f"{self.slave} on {self.master}", self.discretisation, self.given, self.match(), "facets "
-        words = "; ".join(filter(None, parts))
+        parts = f"{self.slave} on {self.master}", self.discretisation, self.given, self.match(), self._missed
+        return "; ".join(filter(None, parts))
+
+    @property
+    def _missed(self) -> str:
         if self.height == 0.0:
-            return words + "miss nothing"
+            return "no error by flat facets"
         share = self.share
         known = "of an unknown part" if share is None else f"{100 * share:.2g} %"
         by = "" if self.approach is None else f" (about {self.approach:.2g})"
-        return words + f"miss it by up to {self.height:.2g}, {known} of the approach{by}"
+        return f"facets miss it by up to {self.height:.2g}, {known} of the approach{by}"
 
     def match(self, much: float = 3.0) -> str:
         """Return in words how badly facets of both sides match, and what to do; empty if they do well enough.
