@@ -7,7 +7,6 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
-from importlib.abc import InspectLoader
 from typing import Any
 
 __all__ = ["homes", "late_names"]
@@ -18,8 +17,8 @@ def homes(package: str) -> dict[str, str]:
     """Return the module of each name that the imports for type checkers of a package list."""
     spec = sys.modules[package].__spec__
     assert spec is not None
-    assert isinstance(spec.loader, InspectLoader)
-    tree = ast.parse(spec.loader.get_source(package) or "")
+    loader: Any = spec.loader  # its class is in importlib.abc, which loads importlib.resources
+    tree = ast.parse(loader.get_source(package) or "")
     parts = [part for part in tree.body if isinstance(part, ast.If)]
     for_types = [part for part in parts if ast.unparse(part.test) == "TYPE_CHECKING"]
     statements = [each for part in for_types for each in part.body if isinstance(each, ast.ImportFrom)]
