@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._pairing.inside import (
     FLAT,
     Deepest,
@@ -122,7 +123,8 @@ def _deepest(
     def gaps_at(facet: np.ndarray, local: np.ndarray) -> np.ndarray:
         return inside.at(facet, local).gap(displaced)
 
-    deepest = deepest_points(inside.slave.corners, facets, gaps_at)
+    rounding = LAST_PLACES * float(np.abs(inside.slave.points).max())
+    deepest = deepest_points(inside.slave.corners, facets, gaps_at, rounding)
     if not len(deepest.facet):
         return None
     points = inside.at(deepest.facet, deepest.local)

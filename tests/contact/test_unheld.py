@@ -481,7 +481,7 @@ def test_a_pair_is_told_of_once(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         for pressure in (1e5, 20.0, 10.0):
             problem.solve(replace(scene, loads=[Pressure("hub", "outer", pressure)]))
-            counts.append(len(caplog.records))
+            counts.append(sum(each.getMessage().startswith("gaps of hub") for each in caplog.records))
     assert counts == [0, 1, 1]
 
 
