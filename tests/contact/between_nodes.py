@@ -31,7 +31,7 @@ STEEL = IsotropicElasticity(2.1e5, 0.3)
 def pressed_on_ball(offset: tuple[float, float], half_width: float, master: Any = None, **pair: Any) -> Scene:
     """Return a block of unit cells pressed onto a ball, half a width of contact wide, offset in cells."""
     ball = RigidSphere((0.0, 0.0, -RADIUS), RADIUS) if master is None else master
-    mesh = block((-5.5, -5.5, 0.0), (5.5, 5.5, 6.0), (11, 11, 6))
+    mesh = block((-4.5, -4.5, 0.0), (4.5, 4.5, 5.0), (9, 9, 5))
     mesh = mesh.moved(mesh.points + np.array([*offset, 0.0]))
     contact = ContactPair(Surface("plate", "z0"), ball, **pair)
     down = Support("plate", "z1", (0.0, 0.0, -(half_width**2) / RADIUS))
