@@ -28,7 +28,7 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.linear_state import LinearState
-from fenics_contact.results.resolution import PeakDoubt
+from fenics_contact.results.resolution import CoarsePeak, PeakDoubt
 from fenics_contact.results.state import State
 
 #: Errors up to this share of what moves are small.
@@ -69,7 +69,7 @@ class ContactWarnings:
             found, peaks = self._doubts(state)
             for pair, kind, words in found:
                 if not (design and kind == "overlap"):
-                    self._log(state, (pair, kind), words, _LOG.info if kind == "rough peak" else None)
+                    self._log_doubt(state, pair, kind, words)
             object.__setattr__(state, "peak_doubts", peaks)
         else:
             self._warn_of_deformed(state)
@@ -77,14 +77,20 @@ class ContactWarnings:
         self._warn_of_passing_bodies(state)
 
     def _warn_of_deformed(self, state: State) -> None:
-        """Warn of pairs of nonlinear materials that slide too far or touch between nodes. Collective."""
-        peaks = list[PeakDoubt]()
-        for number, pair in enumerate(state.scene.contacts):
-            for _, kind, words in [] if state.scene.deforms_much else _slid_far(state, number):
-                self._log(state, (number, kind), words)
+        """Warn of pairs of nonlinear materials that slide too far or are too small for cells. Collective."""
+        peaks, scene, pressed_in = list[PeakDoubt](), state.scene, _indentation(state)
+        for number, pair in enumerate(scene.contacts):
+            for each in [] if scene.deforms_much else _slid_far(state, number):
+                self._log_doubt(state, *each)
             if missed := between_nodes(state, number):
                 peaks.append(doubt := missed.doubt(pair.place))
-                self._log(state, (number, "inside facets"), doubt.warning)
+                self._log_doubt(state, number, "inside facets", doubt.warning)
+            deepest = pressed_in[state.contact.on_pair(number)].max(initial=0.0)
+            if deepest <= computed_rounding(scene.bodies[pair.slave.body].mesh.points):
+                continue  # nothing presses
+            if peak := coarse_peak(state, number, pressed_in):
+                peaks.append(peak)
+                self._log_doubt(state, *_of_peak(number, peak))
         object.__setattr__(state, "peak_doubts", tuple(peaks))
 
     def warn_of_values(self, scene: Scene, comm: MPI.Comm) -> None:
@@ -105,6 +111,9 @@ class ContactWarnings:
             else:
                 self._held.append((log or _LOG.warning, words))
         self._given.add(key)
+
+    def _log_doubt(self, state: State, pair: int, kind: str, words: str) -> None:
+        self._log(state, (pair, kind), words, _LOG.info if kind == "rough peak" else None)
 
     def tell(self) -> None:
         """Log the warnings about the last state that were held back."""
@@ -140,7 +149,7 @@ class ContactWarnings:
                 found.append((number, "facets", _words_of_facets(pair, error, moved)))
             elif peak := coarse_peak(state, number, pressed_in):
                 peaks.append(peak)
-                found.append((number, "peak" if peak.cells == 1 else "rough peak", peak.warning))
+                found.append(_of_peak(number, peak))
             elif unmatched := unmatched_nodes(state, number):
                 peaks.append(unmatched)
             overlap = -float(before[touching].min(initial=0.0))
@@ -343,6 +352,11 @@ def _indentation(state: State) -> np.ndarray:
     """Return how far the force of each point presses its own node in, shape (n,), [length]. Collective."""
     stiffness = state.torn.numbering.gather(state.rows.step, state.torn.normal_rows)
     return np.asarray(state.contact.normal_force / stiffness)
+
+
+def _of_peak(number: int, peak: CoarsePeak) -> tuple[int, str, str]:
+    """Return a pair, the kind of the doubt about its peak, and words."""
+    return number, "peak" if peak.cells == 1 else "rough peak", peak.warning
 
 
 def _largest_motion(closing: np.ndarray, pressed_in: np.ndarray, touching: np.ndarray) -> float:

@@ -221,8 +221,8 @@ class State(ABC):
             iterated.
         known_errors: Errors estimated so far, by a balanced solve or by `LinearState.estimate_errors`; None
             before, and where materials are nonlinear.
-        peak_doubts: What meshes leave uncertain about the largest pressure of pairs, as a solution of linear
-            materials finds it.
+        peak_doubts: What meshes leave uncertain about the largest pressure of pairs; where materials are
+            nonlinear, without what nodes that do not match make of it.
 
     Example:
         >>> state = solve_scene(scene, comm)  # doctest: +SKIP

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import defaultdict
 
 import numpy as np
@@ -24,6 +25,7 @@ from fenics_contact.materials import PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.resolution import CALL, CoarsePeak, UnmatchedNodes, in_words
+from tests.contact.between_nodes import pressed_on_disc
 from tests.contact.round_bodies import CELL, pressed
 
 PLACE = "upper y0 on lower y1"
@@ -136,3 +138,17 @@ def test_one_point_that_a_bent_strip_presses_is_in_doubt() -> None:
     (doubt,) = state.peak_doubts
     assert isinstance(doubt, CoarsePeak)
     assert (doubt.points, doubt.cells) == (1, 1)
+
+
+def test_one_point_that_presses_rubber_is_in_doubt(caplog: pytest.LogCaptureFixture) -> None:
+    """Its force is off by a fifth; fine cells leave no doubt."""
+    with caplog.at_level(logging.WARNING):
+        fine = solve_scene(pressed_on_disc(0.3, 0.075, rubber=True), MPI.COMM_SELF)
+    assert fine.peak_doubts == ()
+    assert caplog.messages == []
+    coarse = solve_scene(pressed_on_disc(0.0, rubber=True), MPI.COMM_SELF)
+    (doubt,) = coarse.peak_doubts
+    assert isinstance(doubt, CoarsePeak)
+    assert (doubt.points, doubt.cells) == (1, 1)
+    assert caplog.messages == [doubt.warning]
+    assert abs(coarse.contact.force[:, 1].sum() / fine.contact.force[:, 1].sum() - 1.0) > 0.2
