@@ -12,6 +12,7 @@ import numpy as np
 
 from fenics_contact._adaptive.crossings import refined_at_crossings
 from fenics_contact._adaptive.goal_errors import goal_error, value_of
+from fenics_contact._adaptive.locking import locking_in_words
 from fenics_contact._adaptive.marking import bulk
 from fenics_contact._adaptive.quantities import quantity as named
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
@@ -479,7 +480,9 @@ class Way:
         last = self.levels[-1]
         reached = last.error <= self.wanted * abs(last.value)
         found = self._state, last.value, last.error, self.wanted, reached
-        return AccurateResult(*found, self.reason, tuple(self.levels))
+        causes = [] if reached else [locking_in_words(self._state.scene)]
+        reason = "; ".join([self.reason, *filter(None, causes)])
+        return AccurateResult(*found, reason, tuple(self.levels))
 
 
 def _percent(level: Level) -> str:
