@@ -8,9 +8,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, BodyMesh, Scene, Support, Traction, solve_scene, solve_to
-from fenics_contact._adaptive.crossings import around_crossings, refined_at_crossings
-from fenics_contact._adaptive.refined_scene import SceneRefinement
+from fenics_contact import (
+    Body,
+    BodyMesh,
+    RigidSurface,
+    Roller,
+    Scene,
+    Support,
+    Traction,
+    solve_scene,
+    solve_to,
+)
+from fenics_contact._adaptive.crossings import Crossings, around_crossings, refined_at_crossings
+from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
+from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import block, rectangle, rectangle_lattice
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
@@ -54,6 +65,48 @@ def test_sides_and_corners_of_inclusions_and_materials_alike_are_no_crossings() 
     assert len(around_crossings(squares(whole(), 100.0, (middle > 0.0).all(axis=1)))) == 0
     assert len(around_crossings(Body(whole(), PlaneStrain(1.0, 0.3)))) == 0
     assert len(around_crossings(checkered(block((-1, -1, 0), (1, 1, 1), (2, 2, 1)), 100.0))) == 0
+
+
+@pytest.mark.parametrize("contrast", [11.0, 100.0, 1e8])
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral"])
+def test_exponents_of_squares_that_cross_are_those_of_theory(cell: str, contrast: float) -> None:
+    found = Crossings.of(checkered(whole(cell), contrast), ())
+    assert found.exponents == pytest.approx([4.0 / np.pi * np.arctan(contrast**-0.5)], rel=1e-3)
+
+
+def column(contrast: float, cell: str, soft: str) -> Body:
+    """Two squares, one on the other, and the left side of each as "low" and "high"."""
+    mesh = rectangle((-1.0, -1.0), (0.0, 1.0), (1, 2), cell)
+    left = mesh.surfaces["x0"]
+    high = mesh.points[left].mean(axis=1)[:, 1] > 0.0
+    parts = {**mesh.surfaces, "low": left[~high], "high": left[high]}
+    above = mesh.points[mesh.cells].mean(axis=1)[:, 1] > 0.0
+    return squares(replace(mesh, surfaces=parts), contrast, above != (soft == "high"))
+
+
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral"])
+@pytest.mark.parametrize("soft", ["low", "high"])
+def test_fixed_surfaces_that_end_at_a_soft_material_beside_a_stiff_one_cross(cell: str, soft: str) -> None:
+    body, other = column(100.0, cell, soft), {"low": "high", "high": "low"}[soft]
+    rigid: list[AnySupport] = [Support("b", soft), RigidSurface("b", soft, (0.0, 0.0))]
+    for support in rigid:
+        found = Crossings.of(body, [support])
+        assert body.mesh.points[found.nodes] == pytest.approx(np.array([[-1.0, 0.0]]))
+        assert found.exponents == pytest.approx([2.0 / np.pi * np.arctan(0.1)], rel=1e-3)
+    none: list[AnySupport] = [Support("b", other), Support("b", "x0"), Roller("b", soft), Support("b", "y0")]
+    for support in none:
+        assert len(Crossings.of(body, [support]).nodes) == 0
+    assert len(Crossings.of(column(1.0, cell, soft), rigid).nodes) == 0
+
+
+@pytest.mark.parametrize("soft", [True, False])
+def test_crossings_are_known_where_one_side_has_smaller_cells(soft: bool) -> None:
+    body = column(100.0, "quadrilateral", "high")
+    scene = Scene({"b": body}, [Support("b", "high")])
+    finer = refine_scene(scene, {"b": body.mesh.regions["soft" if soft else "hard"]}).scene
+    found = Crossings.of(finer.bodies["b"], scene.supports)
+    assert finer.bodies["b"].mesh.hanging is not None
+    assert finer.bodies["b"].mesh.points[found.nodes] == pytest.approx(np.array([[-1.0, 0.0]]))
 
 
 @pytest.mark.parametrize(
