@@ -46,6 +46,7 @@ class Holding:
             nodes = target.nodes[inside[target.nodes]]
             inner = [k for k in target.components if k < self.model.dim]
             self._check_turns(target, nodes)
+            self._check_plane(target, nodes)
             self._check_kept(target)
             if not len(nodes):
                 if not np.isin(target.nodes, self.model.references).any():
@@ -97,6 +98,26 @@ class Holding:
             raise target.card.error(
                 f"nodes of solid elements have no rotation, but {name} is turned: drive the "
                 "surface by a node, with *RIGID BODY or *COUPLING", target.row,
+            )  # fmt: skip
+
+    def _check_plane(self, target: Held, nodes: np.ndarray) -> None:
+        """Reject axes of nodes of plane elements out of the plane, unless nodes are held wholly at zero."""
+        turned = nodes[np.isin(nodes, np.fromiter(self.model.local_axes, dtype=np.int64))]
+        inner = [k for k in target.components if k < 3]
+        if self.model.dim == 3 or not len(turned) or not inner:
+            return
+        across = np.array([abs(self.model.local_axes[int(node)][inner, 2]) for node in turned])
+        wrong = (abs(across - np.equal(inner, 2)) > 1e-9).any(axis=1)
+        for moment in self.model.history.moments:
+            wrong &= (moment.held[turned, :3] != 0.0).any(axis=1)
+        if wrong.any():
+            node = int(turned[wrong][0])
+            k = inner[int(abs(across[wrong][0] - np.equal(inner, 2)).argmax())]
+            axis = ", ".join(f"{value:.4g}" for value in self.model.local_axes[node][k] + 0.0)
+            raise target.card.error(
+                f"node {self.model.mesh.numbers[node]} of plane elements is held along its axis {k + 1}, by "
+                f"*TRANSFORM ({axis}), which must be in the plane, and axis 3 along z: give other axes, or "
+                "hold components 1 to 3 at zero", target.row,
             )  # fmt: skip
 
     def supports(

@@ -111,6 +111,43 @@ def test_nodes_of_a_cylinder_turn_from_x_to_y(tmp_path: Path) -> None:
     np.testing.assert_allclose(moved[17][:2], [0.0, 0.01], atol=1e-12)  # at y = 0
 
 
+#: Axes of nodes of a plate, what holds them, and the axis that is out of the plane.
+OUT_OF_THE_PLANE = [
+    ("1., 0., 0., 0., 0., 1.", "2", r"2, by \*TRANSFORM \(0, 0, 1\)"),
+    ("1., 0., 0., 0., 1., 1.", "2, 2, 0.01", r"2, by \*TRANSFORM \(0, 0.7071, 0.7071\)"),
+    # The third one is −y, which holds the nodes, though plane elements have no third component.
+    ("1., 0., 0., 0., 0., 1.", "3", r"3, by \*TRANSFORM \(0, -1, 0\)"),
+    ("1., 0., 0., 0., 0., 1.", "1, 2", r"2, by \*TRANSFORM \(0, 0, 1\)"),
+]
+
+
+def _plate(axes: str, held: str) -> str:
+    plate = mesh_cards({"BAR": rectangle((0, 0), (2, 1), (2, 1))}, "CPE4") + STEEL + SECTION
+    return plate + f"*TRANSFORM, NSET=BAR_X0, TYPE=R\n{axes}\n*BOUNDARY\nBAR_X1, 1, 2\nBAR_X0, {held}\n"
+
+
+@pytest.mark.parametrize(("axes", "held", "message"), OUT_OF_THE_PLANE)
+def test_nodes_of_plane_elements_are_held_in_the_plane(
+    axes: str, held: str, message: str, tmp_path: Path
+) -> None:
+    text = _plate(axes, held)
+    line = 1 + text.splitlines().index(f"BAR_X0, {held}")
+    with pytest.raises(DeckError, match=rf"line {line}\D.*\*BOUNDARY.* is held along its axis {message}"):
+        read_deck(deck(tmp_path, text + step("*DLOAD\nBAR, P1, 1.\n")))
+
+
+@pytest.mark.parametrize(
+    ("axes", "held"), [("1., 0., 0., 0., 0., 1.", "1, 3"), ("0., 1., 0., 1., 0., 0.", "2")]
+)
+def test_axes_that_turn_the_plane_over_and_nodes_that_are_held_wholly_are_read(
+    axes: str, held: str, tmp_path: Path
+) -> None:
+    found = read_deck(deck(tmp_path, _plate(axes, held) + step("*DLOAD\nBAR, P1, 1.\n")))
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    moved, x = state.gather_displacement("BAR"), found.scene.bodies["BAR"].mesh.points[:, 0]
+    np.testing.assert_allclose(moved[x == 0.0, 0], 0.0, atol=1e-14)
+
+
 def test_equations_let_nodes_slide_and_move_alike(tmp_path: Path) -> None:
     slide = "*EQUATION\n2\n17, 1, 1., 17, 2, 1.\n2\n18, 3, 1., 20, 3, -1.\n"
     found = read_deck(deck(tmp_path, BAR + FIXED + slide + step("*CLOAD\n17, 2, 5.\n20, 3, -4.\n")))
