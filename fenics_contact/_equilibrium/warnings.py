@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
 from fenics_contact._equilibrium.between_nodes import between_nodes
+from fenics_contact._equilibrium.corners_inside import corner_between_nodes
 from fenics_contact._equilibrium.peaks import coarse_peak, unmatched_nodes
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.body import Body
@@ -28,7 +29,7 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.linear_state import LinearState
-from fenics_contact.results.resolution import CoarsePeak, PeakDoubt
+from fenics_contact.results.resolution import BetweenNodes, CoarsePeak, PeakDoubt
 from fenics_contact.results.state import State
 
 #: Errors up to this share of what moves are small.
@@ -82,8 +83,8 @@ class ContactWarnings:
         for number, pair in enumerate(scene.contacts):
             for each in [] if scene.deforms_much else _slid_far(state, number):
                 self._log_doubt(state, *each)
-            if missed := between_nodes(state, number):
-                peaks.append(doubt := missed.doubt(pair.place))
+            if doubt := _between_nodes(state, number):
+                peaks.append(doubt)
                 self._log_doubt(state, number, "inside facets", doubt.warning)
             deepest = pressed_in[state.contact.on_pair(number)].max(initial=0.0)
             if deepest <= computed_rounding(scene.bodies[pair.slave.body].mesh.points):
@@ -141,9 +142,9 @@ class ContactWarnings:
             found += _passing_nodes(state, number, moved) + _open_means(state, number, moved)
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
-            missed = None if error > SHARE * moved else between_nodes(state, number, moved)
-            if missed is not None:
-                peaks.append(doubt := missed.doubt(pair.place))
+            doubt = None if error > SHARE * moved else _between_nodes(state, number, moved)
+            if doubt is not None:
+                peaks.append(doubt)
                 found.append((number, "inside facets", doubt.warning))
             if error > SHARE * moved:  # which points press is not known then
                 found.append((number, "facets", _words_of_facets(pair, error, moved)))
@@ -367,6 +368,13 @@ def _largest_motion(closing: np.ndarray, pressed_in: np.ndarray, touching: np.nd
     if not touching.any():
         return float(np.abs(closing).max(initial=0.0))
     return float(max(np.abs(closing[touching]).max(), pressed_in[touching].max()))
+
+
+def _between_nodes(state: State, number: int, moved: float | None = None) -> BetweenNodes | None:
+    """Return what a pair misses between its nodes, by a corner of its master or inside facets. Collective."""
+    corner = corner_between_nodes(state, number)
+    missed = None if corner else between_nodes(state, number, moved)
+    return missed.doubt(state.scene.contacts[number].place) if missed else corner
 
 
 def _words_of_facets(pair: ContactPair, error: float, moved: float) -> str:

@@ -605,11 +605,16 @@ def slave_of(scene: SceneParts, pair: ContactPair | AnyTie, geometry: Geometry) 
 
 def as_mortar_slave(scene: SceneParts, side: Surface, surface: FacetedSurface) -> FacetedSurface:
     """Return a named surface as the slave of mortar contact: with areas of pieces, and its sharp nodes."""
+    return replace(surface.with_areas_of_pieces(), sharp=sharp_at(scene, side))
+
+
+def sharp_at(scene: SceneParts, side: Surface) -> np.ndarray:
+    """Return which nodes of a named surface, ascending, lie on corners or edges of its body, shape (n,)."""
     mesh = scene.bodies[side.body].mesh
     cuts = mirrored(scene, side.body)
     for neighbour in _neighbours(scene, side.body):
         cuts = np.column_stack([cuts, np.isin(np.arange(mesh.n_nodes), neighbour.here)])
-    return replace(surface.with_areas_of_pieces(), sharp=sharp_nodes(mesh, side.name, cuts))
+    return sharp_nodes(mesh, side.name, cuts)
 
 
 def _neighbours(scene: SceneParts, body: str) -> tuple[Neighbour, ...]:

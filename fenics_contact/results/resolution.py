@@ -89,6 +89,29 @@ class BetweenNodes:
 
 
 @dataclass(frozen=True)
+class CornerBetweenNodes(BetweenNodes):
+    """A corner or an edge of a master that presses between the nodes of its slave.
+
+    Attributes:
+        place: The surfaces of the pair.
+        depth: How far the corner lies inside the slave, deeper than nodes around, [length].
+        moved: How far it moves against the slave, [length].
+        at: The corner, [length].
+    """
+
+    @property
+    def warning(self) -> str:
+        """What is missed, where, and what to do."""
+        where = ", ".join(f"{x:.4g}" for x in self.at)
+        return (
+            f"the contact of {self.place} lies between nodes: a corner of the master, at ({where}), lies "
+            f"{self.depth:.2g} inside the slave, where it moves by {self.moved:.2g} against it: size and "
+            "direction of the contact force may be wrong: exchange slave and master, as nodes of the slave "
+            f"find the other body, or refine the slave there, as {CALL} does"
+        )
+
+
+@dataclass(frozen=True)
 class UnmatchedNodes:
     """Contact by nodes on linear meshes that do not match, whose pressures waver however fine these are.
 

@@ -21,6 +21,7 @@ from fenics_contact import (
 )
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke, PlaneStrain
+from fenics_contact.results.resolution import CALL, CornerBetweenNodes
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 
@@ -41,10 +42,17 @@ def turned_in_plane(mesh: BodyMesh, angle: float, under: tuple[str, ...]) -> Bod
 
 
 def pressed(
-    material: Material, slave: str, master: str, kind: str, cells: int = 5, angle: float = TURN
+    material: Material,
+    slave: str,
+    master: str,
+    kind: str,
+    cells: int = 5,
+    angle: float = TURN,
+    offset: float = 0.0,
 ) -> State:
-    """A bar that stands on one of its corners on a level floor, pressed by 0.05."""
+    """A bar that stands on one of its corners on a level floor, offset along it, pressed by 0.05."""
     floor = rectangle((-2, -1), (2, 0), (8 * cells // 5 + 1, 4))
+    floor = floor.moved(floor.points + np.array([offset, 0.0]))
     bar = turned_in_plane(rectangle((0, 0), (1, 2), (cells, 2 * cells)), angle, ("y0", "x0"))
     sides = Surface(*slave.split()), Surface(*master.split())
     pair = ContactPair(*sides, discretisation=kind)  # type: ignore[arg-type]
@@ -72,6 +80,42 @@ def test_a_corner_presses_along_the_normal_of_the_floor(strain: str, cells: int)
     for slave in ("bar under", "bar y0"):
         state = pressed(material, slave, "floor y1", "mortar", cells)
         require_upright(force_on(state), float(size))
+
+
+@pytest.mark.parametrize("master", ["bar under", "bar y0"])
+@pytest.mark.parametrize("strain", MATERIALS)
+def test_a_corner_of_the_master_between_nodes_of_the_slave_is_named(
+    strain: str, master: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    state = pressed(MATERIALS[strain], "floor y1", master, "node")
+    (doubt,) = (each for each in state.peak_doubts if isinstance(each, CornerBetweenNodes))
+    np.testing.assert_allclose(doubt.at, (0.0, 0.0), atol=0.06)
+    assert 0.005 < doubt.depth <= doubt.moved < 0.06
+    (words,) = (each for each in caplog.messages if "lies between nodes" in each)
+    assert f"the contact of floor y1 on {master} lies between nodes: a corner of the master, at (" in words
+    assert f"lies {doubt.depth:.2g} inside the slave" in words
+    assert "exchange slave and master" in words
+    assert CALL in words
+
+
+@pytest.mark.parametrize("kind", ["node", "mortar"])
+@pytest.mark.parametrize("strain", MATERIALS)
+def test_a_corner_of_the_master_that_touches_nothing_is_never_missed_in_silence(
+    strain: str, kind: str
+) -> None:
+    """Wherever the nodes of the floor lie, and however steep the bar."""
+    for angle, offset in ((20.0, 0.0), (45.0, -0.1), (60.0, 0.2)):
+        there = "floor y1", "bar under", kind
+        state = pressed(MATERIALS[strain], *there, angle=np.radians(angle), offset=offset)
+        assert force_on(state)[1] > 1.0 or state.peak_doubts
+
+
+@pytest.mark.parametrize("strain", MATERIALS)
+@pytest.mark.parametrize(("slave", "master"), [("bar y0", "floor y1"), ("floor y1", "bar y0")])
+def test_edges_of_faces_that_lie_flat_are_no_corners_that_press(strain: str, slave: str, master: str) -> None:
+    state = pressed(MATERIALS[strain], slave, master, "mortar", angle=0.0, offset=0.5)
+    assert force_on(state)[1] > 10.0
+    assert not any(isinstance(each, CornerBetweenNodes) for each in state.peak_doubts)
 
 
 def test_faces_beside_a_corner_press_straight_down_as_well() -> None:
