@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -23,9 +24,11 @@ from fenics_contact._surfaces.facets import corner_places, edge_distance
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.results.contact import ContactResult
-from fenics_contact.results.deformed_state import DeformedState
 from fenics_contact.results.resolution import BetweenNodes
 from fenics_contact.results.state import State
+
+if TYPE_CHECKING:
+    from fenics_contact.results.deformed_state import DeformedState
 
 #: Depths below nodes up to this share of what moves are those of meshes that are fine enough.
 SHARE = 0.1
@@ -111,8 +114,7 @@ def between_nodes(state: State, number: int, moved: float | None = None) -> Miss
 
 
 def _where_it_is(state: State, inside: InsideOf, number: int) -> InsideOf:
-    assert isinstance(state, DeformedState)
-    points = state.equilibrium.evaluation.contact.points
+    points = cast("DeformedState", state).equilibrium.evaluation.contact.points
     assert points is not None
     return inside.moved(points.coordinates, points.placements[number])
 
@@ -214,9 +216,13 @@ class InsideFacets:
 
     @staticmethod
     def _is_found(state: State, number: int) -> bool:
-        """Return whether two bodies touch: where some of their nodes or means press, no others do."""
-        pressing = state.contact.normal_force[state.contact.on_pair(number)] > 0.0
-        return isinstance(state.scene.contacts[number].master, Surface) and bool(pressing.any())
+        """Return whether nodes find a contact: where more of them press than a facet has, facets do not.
+
+        Between two bodies one node or mean is enough.
+        """
+        pressing = np.count_nonzero(state.contact.normal_force[state.contact.on_pair(number)] > 0.0)
+        bodies = isinstance(state.scene.contacts[number].master, Surface)
+        return bool(pressing > (0 if bodies else 2 ** (state.scene.dim - 1)))
 
 
 def _pressing(state: State, missed: Missed, busy: np.ndarray) -> InFacets:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -15,9 +16,11 @@ from fenics_contact._surfaces.projection import Projection, node_weights, projec
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
-from fenics_contact.results.deformed_state import DeformedState
 from fenics_contact.results.resolution import CornerBetweenNodes
 from fenics_contact.results.state import State
+
+if TYPE_CHECKING:
+    from fenics_contact.results.deformed_state import DeformedState
 
 #: Depths of corners up to this share of what moves are those of meshes that are fine enough.
 SHARE = 0.1
@@ -100,8 +103,7 @@ def corner_between_nodes(state: State, number: int) -> CornerBetweenNodes | None
         return None
     coordinates = None
     if scene.deforms_much:
-        assert isinstance(state, DeformedState)
-        points = state.equilibrium.evaluation.contact.points
+        points = cast("DeformedState", state).equilibrium.evaluation.contact.points
         coordinates = None if points is None else points.coordinates
     with together(comm):
         corners = _Corners.of(scene, pair, coordinates)

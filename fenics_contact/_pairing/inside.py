@@ -23,7 +23,6 @@ from fenics_contact._pairing.points import (
     reference_axes,
     tangent_frames,
 )
-from fenics_contact._pairing.sliding.closest import moved_surface
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
@@ -204,6 +203,8 @@ class InsideOf:
         `coordinates`: of all nodes, shape (n_nodes, dim), [length]; `placement`: rotation and translation of
         the obstacle, None where it rests.
         """
+        from fenics_contact._pairing.sliding.closest import moved_surface
+
         slave = moved_surface(self.slave, coordinates[self.nodes])
         if isinstance(self.pair.master, Surface):
             assert self.master is not None
