@@ -50,6 +50,21 @@ def around_crossings(body: Body, supports: Sequence[AnySupport] = (), finest: fl
     return np.flatnonzero(at_crossings & (_widths(body) > finest))
 
 
+def left_at_crossings(scene: Scene) -> float:
+    """Return (h/L)^2α of the crossing where it is largest, 0 without crossings.
+
+    What cells of the width h there miss of an energy, or of a quantity whose adjoint is as singular as the
+    state, is proportional to it; L is the size of the body.
+    """
+    left = [0.0]
+    for name, body in _bodies(scene):
+        found, widths = Crossings.of(body, _of(name, scene.supports)), _widths(body)
+        for node, exponent in zip(found.nodes, found.exponents, strict=True):
+            width = widths[(body.mesh.cells == node).any(axis=1)].max()
+            left.append(float(width ** (2.0 * exponent)))
+    return max(left)
+
+
 def _bodies(scene: Scene) -> Sequence[tuple[str, Body]]:
     return list(scene.deforming.items())
 
