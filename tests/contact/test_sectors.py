@@ -13,10 +13,13 @@ from mpi4py import MPI
 
 from fenics_contact import (
     Body,
+    ClosureTable,
     ContactPair,
     ContactProblem,
     Coulomb,
     CyclicSymmetry,
+    LoadSequence,
+    LoadStep,
     Pressure,
     RigidPlane,
     Roller,
@@ -35,9 +38,11 @@ from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.design import TotalPotential
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.materials import NeoHooke
+from fenics_contact.materials import NeoHooke, PlaneStrain
 from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.pictures.unrolled import contact_patches
+from fenics_contact.qp import SlidingError
+from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.results.deformed_state import AnyState
 from tests.contact.press_fits import BORE, NU, RIM, ring
 from tests.contact.sector_cases import (
@@ -209,6 +214,38 @@ def test_a_sector_that_supports_hold_in_one_subdomain_still_has_its_rows() -> No
     one = solve_scene(scene, MPI.COMM_SELF, partitions=whole, tolerance=1e-11)
     expected = solved(scene, 3).gather_displacement("a")
     np.testing.assert_allclose(one.gather_displacement("a"), expected, atol=1e-8 * np.abs(expected).max())
+
+
+def test_a_torque_beyond_friction_is_refused_with_the_share_that_a_fit_of_soft_surfaces_carries(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Friction carries μ N r about the axis: 0.9 of it is held; 32 times are refused early."""
+    products, counted = [], CountedOperator.__call__
+    monkeypatch.setattr(CountedOperator, "__call__", lambda *args: products.append(1) or counted(*args))
+    law = ClosureTable((0.0, 0.01, 0.015), (0.0, 0.0005, 0.002))
+    steel = PlaneStrain(1.0, 0.3)
+    bodies = {
+        "shaft": Body(ring(0.3, 1.0, 24, 1, part=1 / SECTORS, shapes=False), steel),
+        "hub": Body(ring(1.0, 1.8, 36, 1, part=1 / SECTORS, shapes=False), steel),
+    }
+    ties = [CyclicSymmetry(Surface(name, "end"), Surface(name, "start"), (0.0, 0.0)) for name in bodies]
+    pair = ContactPair(
+        Surface("hub", "inner"), Surface("shaft", "outer"), Coulomb(0.4), interference=0.01, closure=law
+    )
+    scene = Scene(bodies, [Support("shaft", "inner")], contacts=[pair], ties=ties)
+    fit = LoadSequence(ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-6))
+    limit = 0.4 * fit.advance(LoadStep("fit")).contact.normal_force.sum()
+
+    def torque(times: float) -> LoadStep:
+        twist = times * limit / (1.8**3 * 2 * np.pi / SECTORS)
+        across = Traction("hub", "outer", lambda x: twist * np.column_stack([-x[:, 1], x[:, 0]]))
+        return LoadStep("torque", loads=[across])
+
+    assert fit.advance(torque(0.9)).contact.count(Status.OPEN) == 0
+    with pytest.raises(SlidingError, match=r"makes slide 'hub' .* friction carries only") as refused:
+        fit.advance(torque(32.0))
+    assert refused.value.share == pytest.approx(1 / 32, rel=0.01)
+    assert 0 < len(products) < 700
 
 
 def test_effects_and_plan_name_the_sectors() -> None:
