@@ -1,4 +1,4 @@
-"""Corners of a master that press between the nodes of its slave."""
+"""Corners of a master that press between the nodes of its slave, or are kept away from it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from fenics_contact._pairing.inside import InsideOf
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import sharp_at
 from fenics_contact._scene.scene import Scene
-from fenics_contact._surfaces.facets import FacetedSurface
+from fenics_contact._surfaces.facets import FacetedSurface, corner_places
 from fenics_contact._surfaces.projection import Projection, node_weights, project
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
-from fenics_contact.results.resolution import CornerBetweenNodes
+from fenics_contact.results.resolution import BetweenNodes, CornerBetweenNodes, CornerKeptAway
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
@@ -38,13 +38,14 @@ class _Corners:
     """Corners of a master that face its slave.
 
     Attributes:
-        slave, master: The surfaces, where they are if bodies deform much.
+        sides: The surfaces, where they are if bodies deform much.
+        master: That of the master.
         nodes: Nodes of slave and of master among those of all bodies.
         node: Position of each corner in the master, shape (n,).
         hit: Where they lie over the slave.
     """
 
-    slave: FacetedSurface
+    sides: InsideOf
     master: FacetedSurface
     nodes: tuple[np.ndarray, np.ndarray]
     node: np.ndarray
@@ -60,42 +61,50 @@ class _Corners:
         sides = InsideOf.of(scene, pair)
         if coordinates is not None:
             sides = sides.moved(coordinates, None)
-        slave, master = sides.slave, sides.master
+        master = sides.master
         assert master is not None
         nodes = sides.nodes, sides.numbers.global_nodes(pair.master.body, master.nodes)
-        hit = project(master.points[sharp], master.normals[sharp], slave)
+        hit = project(master.points[sharp], master.normals[sharp], sides.slave)
         hit = hit.part(~_lie_flat(master, sharp[hit.point], hit.normal))
-        return cls(slave, master, nodes, sharp[hit.point], hit) if len(hit.point) else None
+        return cls(sides, master, nodes, sharp[hit.point], hit) if len(hit.point) else None
 
     def followed(self, moved: np.ndarray) -> np.ndarray:
         """Return how far corners move against the slave, from displacements of all nodes, (n, dim)."""
         own, other = self.nodes
-        return np.asarray(moved[other[self.node]] - node_weights(self.slave, self.hit) @ moved[own])
+        return np.asarray(moved[other[self.node]] - node_weights(self.sides.slave, self.hit) @ moved[own])
 
     def at_nodes(self, gap: np.ndarray) -> np.ndarray:
         """Return the smallest gap at the nodes of their facets, at most zero, shape (n,)."""
-        own, _ = self.nodes
-        lowest: np.ndarray = gap[own[self.slave.facets[self.hit.facet]]].min(axis=1)
-        return np.minimum(lowest, 0.0)
+        return np.minimum(gap[self.below].min(axis=1), 0.0)
+
+    def near(self, pressing: np.ndarray) -> np.ndarray:
+        """Return which of them lie over facets of nodes that press, none where other nodes press as well."""
+        found: np.ndarray = np.isin(self.below, pressing).any(axis=1)
+        return found & np.isin(pressing, self.below[found]).all()
+
+    def lowest_at(self, pressing: np.ndarray, moved: np.ndarray) -> float:
+        """Return the smallest gap at the corners of the facets of nodes that press, [length]."""
+        slave = self.sides.slave
+        facet = np.flatnonzero(np.isin(self.nodes[0][slave.facets], pressing).any(axis=1))
+        ends = corner_places(slave.corners)
+        at = np.repeat(facet, len(ends)), np.tile(ends, (len(facet), 1))
+        return float(self.sides.at(*at).gap(moved).min(initial=np.inf))
+
+    @property
+    def below(self) -> np.ndarray:
+        """Nodes of the facets of the slave below them, shape (n, corners)."""
+        return np.asarray(self.nodes[0][self.sides.slave.facets[self.hit.facet]])
 
     @property
     def widths(self) -> np.ndarray:
-        """Widths of their facets, shape (n,), [length]."""
-        facets = self.slave.points[self.slave.facets[self.hit.facet]]
-        return np.asarray(np.linalg.norm(np.ptp(facets, axis=1), axis=1))
-
-    @property
-    def needed(self) -> np.ndarray:
-        """The nodes among those of all bodies that `followed` needs."""
-        own, other = self.nodes
-        facets = self.slave.facets[self.hit.facet] if self.slave.whole is None else self.slave.facets
-        return np.union1d(own[facets.ravel()], other[self.node])
+        """Widths of these facets, shape (n,), [length]."""
+        return self.sides.sizes[self.hit.facet]
 
 
-def corner_between_nodes(state: State, number: int) -> CornerBetweenNodes | None:
-    """Return which corner of its master a pair misses by more than a share of what moves. Collective.
+def corner_between_nodes(state: State, number: int) -> BetweenNodes | None:
+    """Return which corner of its master a pair misses, or keeps away, by more than a share of what moves.
 
-    None where it misses none, and where its gaps are given.
+    Collective. None where there is none, and where its gaps are given.
     """
     scene, decomposition = state.scene, state.torn.decomposition
     pair, comm = scene.contacts[number], state.torn.decomposition.comm
@@ -110,30 +119,36 @@ def corner_between_nodes(state: State, number: int) -> CornerBetweenNodes | None
     if corners is None:
         return None
     moved = np.zeros((decomposition.tearing.n_nodes, scene.dim))
-    displacement = nodal_mean_at(decomposition, state.torn_displacement, corners.needed)
-    moved[corners.needed] = displacement[:, : scene.dim]
+    needed = np.concatenate(corners.nodes)
+    moved[needed] = nodal_mean_at(decomposition, state.torn_displacement, needed)[:, : scene.dim]
     with together(comm):
-        found = _deepest(state, number, corners, moved)
+        found = _doubt(state, number, corners, moved)
     return comm.bcast(found)
 
 
-def _deepest(state: State, number: int, corners: _Corners, moved: np.ndarray) -> CornerBetweenNodes | None:
-    scene, contact = state.scene, state.contact
-    pair, hit = scene.contacts[number], corners.hit
+def _doubt(state: State, number: int, corners: _Corners, moved: np.ndarray) -> BetweenNodes | None:
+    scene, contact, hit = state.scene, state.contact, corners.hit
     mine = contact.on_pair(number)
     closing = np.einsum("nd,nd->n", hit.normal, corners.followed(moved))
     before = hit.gap - closing if scene.deforms_much else hit.gap
     gap = np.where(before >= -WIDTHS * corners.widths, before + closing, np.inf)
+    pressing = contact.points.slave[mine][contact.normal_force[mine] > 0.0]
     at_nodes = np.full(len(moved), np.inf)
     at_nodes[contact.points.slave[mine]] = contact.gap[mine]
     missed = np.maximum(corners.at_nodes(at_nodes) - gap, 0.0)
+    kind: type[BetweenNodes] = CornerBetweenNodes
+    near, least = corners.near(pressing) & np.isfinite(gap), SHARE if len(pressing) else ALONE
+    if near.any() and not missed.any():
+        kind = CornerKeptAway
+        lowest = corners.lowest_at(pressing, np.zeros_like(moved) if scene.deforms_much else moved)
+        nearest = gap[near].min()
+        missed = np.where(near & (gap == nearest), max(min(nearest, lowest), 0.0), 0.0)
     at = int(np.argmax(missed))
     far = float(np.abs(closing[missed > 0.0]).max(initial=0.0))
-    least = SHARE if contact.normal_force[mine].any() else ALONE
-    if far <= computed_rounding(corners.slave.points) or missed[at] <= least * far:
+    if far <= computed_rounding(corners.sides.slave.points) or missed[at] <= least * far:
         return None
     where = tuple(map(float, corners.master.points[corners.node[at]]))
-    return CornerBetweenNodes(pair.place, float(missed[at]), far, where)
+    return kind(scene.contacts[number].place, float(missed[at]), far, where)
 
 
 def _lie_flat(master: FacetedSurface, node: np.ndarray, normal: np.ndarray) -> np.ndarray:

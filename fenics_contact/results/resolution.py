@@ -112,6 +112,29 @@ class CornerBetweenNodes(BetweenNodes):
 
 
 @dataclass(frozen=True)
+class CornerKeptAway(BetweenNodes):
+    """A corner or an edge of a master that does not touch the slave, which presses on it all the same.
+
+    Attributes:
+        place: The surfaces of the pair.
+        depth: How far the surfaces are apart, [length].
+        moved: How far they move against each other, [length].
+        at: The corner, [length].
+    """
+
+    @property
+    def warning(self) -> str:
+        """What is wrong, where, and what to do."""
+        where = ", ".join(f"{x:.4g}" for x in self.at)
+        return (
+            f"the contact of {self.place} presses where nothing touches: a corner of the master, at "
+            f"({where}), is kept {self.depth:.2g} away from the slave, where it moves by {self.moved:.2g} "
+            "against it, as cells are too large: size and direction of the contact force may be wrong: "
+            f"exchange slave and master, or refine the slave there, as {CALL} does"
+        )
+
+
+@dataclass(frozen=True)
 class UnmatchedNodes:
     """Contact by nodes on linear meshes that do not match, whose pressures waver however fine these are.
 
