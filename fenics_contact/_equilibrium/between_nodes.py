@@ -45,6 +45,7 @@ RELIEF = 2.0 / 3.0
 LEFT, LEFT_CLOSED = 0.1, 0.2
 #: Reliefs that are as near to those of their forces as this are kept.
 ENOUGH = 0.8
+#: Divisors are no smaller.
 TINY = float(np.finfo(float).tiny)
 
 

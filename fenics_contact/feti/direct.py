@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +12,11 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact.errors import ConvergenceError
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.torn import TornSystem
+
+_LOG = logging.getLogger(__name__)
 
 #: Largest error of a solution in energy norm, relative to it.
 WRONG = 1e-4
@@ -66,7 +70,10 @@ class DirectSystem:
             return
         with (timer or PhaseTimer()).phase("factor"):
             free = self._stiffness[self._free][:, self._free].tocsr()
-            self._factor = Factor.of_stiffness(free) if len(self._free) else None
+            self._factor = Factor(free) if len(self._free) else None
+            # Loads that do no work on motions without energy have an answer, as one row of C3D20R has.
+            if self._factor is not None and (words := self._factor.doubt(free)):
+                safe_log(_LOG.warning, "displacements may contain motions without energy: %s", words)
 
     @property
     def _stiffness(self) -> sp.csr_matrix:

@@ -57,15 +57,20 @@ class Factor:
             InvalidInputError: If some motion has no energy but rounding.
         """
         factor = cls(matrix)
-        error = factor.error_of_a_solution(matrix)
-        if not error < worst:
-            raise InvalidInputError(
-                "a factored stiffness must resist every motion, but of a solution that is known components "
-                f"are off by {error:.2g} of themselves, so that some motion costs no energy but rounding: "
-                f"{ONE_LAYER}; or a body is too slender, its cells are too flat, or its materials too "
-                "different for double precision"
-            )
+        if words := factor.doubt(matrix, worst):
+            raise InvalidInputError(f"a factored stiffness must resist every motion, but {words}")
         return factor
+
+    def doubt(self, matrix: sp.csr_matrix, worst: float = 0.02) -> str:
+        """Return in words that a stiffness has motions without energy but rounding; empty if it has none."""
+        error = self.error_of_a_solution(matrix)
+        if error < worst:
+            return ""
+        return (
+            f"of a solution that is known components are off by {error:.2g} of themselves, so that some "
+            f"motion costs no energy but rounding: {ONE_LAYER}; or a body is too slender, its cells are too "
+            "flat, or its materials too different for double precision"
+        )
 
     def error_of_a_solution(self, matrix: sp.csr_matrix) -> float:
         """Return the largest relative error of components of a solution that is known, ±1 / √K_ii.

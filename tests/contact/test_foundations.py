@@ -137,16 +137,15 @@ def test_a_rubber_block_sinks_into_the_same_springs(boxes) -> None:
     assert len(state.solution.history) <= 5
 
 
-def test_rubber_needs_something_else_that_resists_each_motion() -> None:
-    soil = ElasticFoundation("b", "z0", (1.0, 1.0, 5.0))
-    scene = Scene(
-        {"b": Body(cube(), NeoHooke(100.0, 0.0))},
-        [],
-        [TotalForce("b", "z1", (0, 0, -9))],
-        foundations=[soil],
-    )
-    with pytest.raises(InfeasibleError, match="supports, ties or contacts that resist every motion beside"):
-        solve_scene(scene, MPI.COMM_SELF)
+def test_rubber_that_a_foundation_alone_holds_sinks_by_force_over_stiffness() -> None:
+    soil, force = ElasticFoundation("b", "z0", (1.0, 1.0, 5.0)), 0.9
+    mesh = cube()
+    bodies = {"b": Body(mesh, NeoHooke(100.0, 0.0))}
+    scene = Scene(bodies, [], [TotalForce("b", "z1", (0, 0, -force))], foundations=[soil])
+    state = solve_scene(scene, MPI.COMM_SELF)
+    area = np.prod(np.ptp(mesh.points, axis=0)[:2])
+    below = state.gather_displacement("b")[np.unique(mesh.surfaces["z0"])]
+    np.testing.assert_allclose(below, np.tile([0.0, 0.0, -force / (5.0 * area)], (len(below), 1)), atol=1e-9)
 
 
 def test_what_springs_do_not_resist_must_be_held() -> None:

@@ -114,7 +114,7 @@ def test_every_rank_is_told_why_there_is_no_answer(ranks: int) -> None:
         assert "InfeasibleError: every body must be held" in sliding
         assert "body 'block' can move away under the load: translation (" in sliding
         assert "'block' can move away under the load: translation (0, 0, 1) meets no resistance" in lifted
-        assert "ConvergenceError: " in stopped
+        assert "StoppedError: " in stopped
 
 
 # What users see of a state is the same on any number of ranks, at the tolerance that they get.

@@ -97,6 +97,7 @@ def misplaced(whole: Whole, points: ContactPoints, pairs: list[ContactPair]) -> 
 
 def _pair_misplaced(whole: Whole, points: ContactPoints, pair: ContactPair, own: np.ndarray) -> Iterator[str]:
     slave, side = points.slave[own], Side.of(whole, pair.slave)
+    at_nodes = np.setdiff1d(own, points.are_inside)  # others stand for contact inside a facet
     nodes = np.unique(side.facets)
     if len(np.unique(slave)) != len(slave) or not np.isin(slave, nodes).all():
         yield "points are no nodes of the slave, or the same"
@@ -112,17 +113,17 @@ def _pair_misplaced(whole: Whole, points: ContactPoints, pair: ContactPair, own:
         yield from _areas(whole, pair.slave, slave, points.area[own])
     if isinstance(pair.master, Surface):
         master = Side.of(whole, pair.master)
-        yield from _weights(whole, points, own, (side, master), mortar, length)
+        yield from _weights(whole, points, at_nodes, (side, master), mortar, length)
         if master.flat and side.flat and not mortar:
             must = above(whole, movable, side, master)
             missing = np.setdiff1d(must, slave)
             if len(missing):
                 yield f"{len(missing)} of {len(must)} nodes above the master are no contact points"
         return
-    distance, normal = own_distance(pair.master, whole.points[slave])
-    if np.abs(points.gap[own] - distance).max(initial=0.0) > length:
-        yield f"gaps to the obstacle are off by {np.abs(points.gap[own] - distance).max():.1e}"
-    if np.abs(points.normal[own] - normal).max(initial=0.0) > 1e-6:
+    distance, normal = own_distance(pair.master, whole.points[points.slave[at_nodes]])
+    if np.abs(points.gap[at_nodes] - distance).max(initial=0.0) > length:
+        yield f"gaps to the obstacle are off by {np.abs(points.gap[at_nodes] - distance).max():.1e}"
+    if np.abs(points.normal[at_nodes] - normal).max(initial=0.0) > 1e-6:
         yield "normals are not those of the obstacle"
     facing = np.einsum("nd,nd->n", side.mean[movable], own_distance(pair.master, whole.points[movable])[1])
     if len(np.setdiff1d(movable[facing < -1e-6], slave)) or len(

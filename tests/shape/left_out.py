@@ -76,9 +76,9 @@ def without_own(derivative: str) -> Callable[[Patch], None]:
 
 
 def without_areas(patch: Patch) -> None:
-    whole = contact_derivative.areas_pulled_back  # type: ignore[attr-defined]
+    whole = contact_derivative.point_areas_pulled_back  # type: ignore[attr-defined]
     patch.setattr(
-        contact_derivative, "areas_pulled_back", lambda *arguments: np.zeros_like(whole(*arguments))
+        contact_derivative, "point_areas_pulled_back", lambda *arguments: np.zeros_like(whole(*arguments))
     )
 
 

@@ -66,7 +66,8 @@ def test_the_adjoints_agree_with_central_differences(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["floor", "space, mortar"])
 def test_taylor_remainders_are_quadratic(name: str) -> None:
-    assert line(name).taylor_rate() > 1.9
+    near = replace(line(name), taylor=(0.5, 1.0))  # a point opens on the way to twice the step
+    assert near.taylor_rate() > 1.9
 
 
 def test_points_open_and_close_again_and_slip_in_both_directions() -> None:
