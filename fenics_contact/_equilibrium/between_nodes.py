@@ -82,12 +82,12 @@ class Missed:
         return BetweenNodes(place, float(self.deepest.missed[at]), self.moved, where)
 
 
-def between_nodes(state: State, number: int, moved: float | None = None) -> Missed | None:
+def between_nodes(state: State, number: int, moved: float = 0.0) -> Missed | None:
     """Return what a pair misses between its nodes by more than a share of what moves. Collective.
 
     None where it misses nothing, and where its gaps are given.
 
-    `moved`: how far its surfaces move against each other, [length]; None: as the deepest facets do.
+    `moved`: how far its surfaces move against each other, at least, [length].
     """
     scene, comm = state.scene, state.torn.decomposition.comm
     pair = scene.contacts[number]
@@ -108,7 +108,7 @@ def between_nodes(state: State, number: int, moved: float | None = None) -> Miss
             found = _deepest(inside, undeformed, number, facets, displaced)
             least = SHARE if presses else ALONE
             if found is not None:
-                found = replace(found, moved=found.moved if moved is None else moved)
+                found = replace(found, moved=max(found.moved, moved))
                 if found.deepest.missed.max() <= least * found.moved:
                     found = None
     return comm.bcast(found)

@@ -83,10 +83,10 @@ class ContactWarnings:
         for number, pair in enumerate(scene.contacts):
             for each in [] if scene.deforms_much else _slid_far(state, number):
                 self._log_doubt(state, *each)
-            if doubt := _between_nodes(state, number):
+            deepest = float(pressed_in[state.contact.on_pair(number)].max(initial=0.0))
+            if doubt := _between_nodes(state, number, deepest):
                 peaks.append(doubt)
                 self._log_doubt(state, number, "inside facets", doubt.warning)
-            deepest = pressed_in[state.contact.on_pair(number)].max(initial=0.0)
             if deepest <= computed_rounding(scene.bodies[pair.slave.body].mesh.points):
                 continue  # nothing presses
             if peak := coarse_peak(state, number, pressed_in):
@@ -370,7 +370,7 @@ def _largest_motion(closing: np.ndarray, pressed_in: np.ndarray, touching: np.nd
     return float(max(np.abs(closing[touching]).max(), pressed_in[touching].max()))
 
 
-def _between_nodes(state: State, number: int, moved: float | None = None) -> BetweenNodes | None:
+def _between_nodes(state: State, number: int, moved: float) -> BetweenNodes | None:
     """Return what a pair misses between its nodes, by a corner of its master or inside facets. Collective."""
     corner = corner_between_nodes(state, number)
     missed = None if corner else between_nodes(state, number, moved)

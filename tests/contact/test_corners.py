@@ -117,8 +117,7 @@ def test_a_corner_of_the_master_is_never_wrong_in_silence(strain: str, kind: str
 def test_a_corner_of_the_master_that_is_kept_away_is_named(caplog: pytest.LogCaptureFixture) -> None:
     there = {"angle": np.radians(70.0), "offset": -0.16}
     state = pressed(MATERIALS["large"], "floor y1", "bar under", "mortar", **there)
-    (doubt,) = state.peak_doubts
-    assert isinstance(doubt, CornerKeptAway)
+    (doubt,) = (each for each in state.peak_doubts if isinstance(each, CornerKeptAway))
     corner = np.array(doubt.at)
     assert abs(corner[0]) < 0.05
     (words,) = (each for each in caplog.messages if "presses where nothing touches" in each)
