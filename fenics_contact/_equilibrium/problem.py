@@ -138,8 +138,7 @@ class LinearEquilibria:
                 break
             with self._timer.phase("assemble"):
                 others = with_points(torn, points)
-                if before is not None:
-                    others = others.with_slip_from(*self._slip_origin(before, others))
+                others = others.with_slip_from(*self._slip_origin(before, others)) if before else others
             state = passes.run(others)
         return state if passes.count == 1 else passes.answer(state)
 

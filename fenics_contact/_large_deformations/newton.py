@@ -150,7 +150,7 @@ class TangentNewton:
     care: float = 0.1
     patience: int = 4
     caution: float = 0.2
-    stalls: int = 3
+    stalls: int = 4
     room: float = 0.2
     near: float = 1e-2
     least_care: float = 1e-3

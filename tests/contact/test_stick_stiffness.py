@@ -146,8 +146,10 @@ def test_springs_turn_with_the_bodies(discretisation: Discretisation) -> None:
     found = solve_steps(ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-10), [step for _, step in states])
     first = found[0].contact.force
     assert np.abs(first[:, 0].sum()) > 0.2
+    # By mortar slips of corners turn with the slave, normals with the master: second order in the angle.
+    near = 1e-6 if discretisation == "node" else 3e-6
     for (turn, _), state in zip(states, found, strict=True):
-        np.testing.assert_allclose(state.contact.force @ turn, first, atol=1e-6 * np.abs(first).max())
+        np.testing.assert_allclose(state.contact.force @ turn, first, atol=near * np.abs(first).max())
     assert NewtonSteps.of(found).reduction.max() < 1e-2, "tangents are exact"
 
 

@@ -29,7 +29,7 @@ from fenics_contact.materials import NeoHooke
 def test_an_overloaded_pad_gives_up_attempts_in_vain_and_reports_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its residuals do not fall: three times four steps are enough, in place of 25."""
+    """Its residuals do not fall: four stalls are enough, in place of 25 steps."""
     events = list[Event]()
     monkeypatch.setattr(progress, "LISTENERS", [events.append])
     pad = Body(rectangle((0.0, 0.0), (10.0, 5.0), (6, 3)), NeoHooke(5.0, 0.45))
