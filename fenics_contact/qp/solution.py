@@ -131,16 +131,16 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
         *(_square(x[equality]) for x in (residual, product - problem.rhs, problem.rhs)),
         _square(multiplier),
         _square(problem.rhs),
-        *(_square(x[layout.normal]) for x in (product, product - problem.rhs - residual)),
+        _square(product[layout.normal]),
         *(_square(error[rows]) for rows in (free & ~idle, ~free, idle)),
         *(_square(needed[rows]) for rows in (free, ~free)),
         _square(step[idle]),
         problem.coarse.local(multiplier),
     )
     normal, normal_mapped, force, force_mapped = np.sqrt(sums[:4])
-    jump, cancelled, load, everything, rhs, pressed, moved = np.sqrt(sums[4:11])
-    distance, distance_held, distance_idle, closing, closing_held, stiff = np.sqrt(sums[11:17])
-    unbalanced = problem.coarse.norm(sums[17:] - problem.coarse.load)
+    jump, cancelled, load, everything, rhs, pressed = np.sqrt(sums[4:10])
+    distance, distance_held, distance_idle, closing, closing_held, stiff = np.sqrt(sums[10:16])
+    unbalanced = problem.coarse.norm(sums[16:] - problem.coarse.load)
     loads = problem.coarse.norm(problem.coarse.load)
     force_scale = max(normal, normal_mapped)
     if force_scale <= FORCE_FLOOR * max(force, force_mapped):
@@ -150,9 +150,8 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     force_scale = max(force_scale, least.force)
     gluing_scale = max(cancelled, load, least.gluing) or rhs
     # Errors below the last places of all forces, and jumps of what the loads alone would open, or of what
-    # contact forces displace, are none: an interference alone may displace nothing at supports. Nor are those
-    # of how far bodies move as a whole towards contact: stiff ones on a soft bed move far and deform little.
-    # Neither are jumps where nothing presses that are rounding of how far supports move bodies.
+    # contact forces displace, are none: an interference alone may displace nothing at supports. Neither are
+    # jumps where nothing presses that are rounding of how far supports move bodies.
     rounding = LAST_PLACES * max(everything, closing)
     distance = hypot(
         distance if distance > rounding else 0.0,
@@ -162,7 +161,7 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     violation = global_max(problem.comm, feasible.violation(multiplier))
     return Residuals(
         natural=_ratio(distance, force_scale),
-        gluing=_ratio(jump if jump > LAST_PLACES * max(load, pressed, moved) else 0.0, gluing_scale),
+        gluing=_ratio(jump if jump > LAST_PLACES * max(load, pressed) else 0.0, gluing_scale),
         coarse=_ratio(unbalanced, max(everything, loads, least.everything)),
         violation=_ratio(violation if violation > rounding else 0.0, force_scale),
         force_scale=force_scale,
