@@ -29,7 +29,13 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.linear_state import LinearState
-from fenics_contact.results.resolution import BetweenNodes, CoarsePeak, PeakDoubt
+from fenics_contact.results.resolution import (
+    BetweenNodes,
+    CoarsePeak,
+    CornerBetweenNodes,
+    CornerKeptAway,
+    PeakDoubt,
+)
 from fenics_contact.results.state import State
 
 #: Errors up to this share of what moves are small.
@@ -86,7 +92,7 @@ class ContactWarnings:
             deepest = float(pressed_in[state.contact.on_pair(number)].max(initial=0.0))
             if doubt := _between_nodes(state, number, deepest):
                 peaks.append(doubt)
-                self._log_doubt(state, number, "inside facets", doubt.warning)
+                self._log_doubt(state, number, _kind_of_missed(state, number, doubt), doubt.warning)
             if deepest <= computed_rounding(scene.bodies[pair.slave.body].mesh.points):
                 continue  # nothing presses
             if peak := coarse_peak(state, number, pressed_in):
@@ -114,7 +120,7 @@ class ContactWarnings:
         self._given.add(key)
 
     def _log_doubt(self, state: State, pair: int, kind: str, words: str) -> None:
-        self._log(state, (pair, kind), words, _LOG.info if kind == "rough peak" else None)
+        self._log(state, (pair, kind), words, _LOG.info if kind.startswith("rough") else None)
 
     def tell(self) -> None:
         """Log the warnings about the last state that were held back."""
@@ -145,7 +151,7 @@ class ContactWarnings:
             doubt = None if error > SHARE * moved else _between_nodes(state, number, moved)
             if doubt is not None:
                 peaks.append(doubt)
-                found.append((number, "inside facets", doubt.warning))
+                found.append((number, _kind_of_missed(state, number, doubt), doubt.warning))
             if error > SHARE * moved:  # which points press is not known then
                 found.append((number, "facets", _words_of_facets(pair, error, moved)))
             elif peak := coarse_peak(state, number, pressed_in):
@@ -368,6 +374,13 @@ def _largest_motion(closing: np.ndarray, pressed_in: np.ndarray, touching: np.nd
     if not touching.any():
         return float(np.abs(closing).max(initial=0.0))
     return float(max(np.abs(closing[touching]).max(), pressed_in[touching].max()))
+
+
+def _kind_of_missed(state: State, number: int, doubt: BetweenNodes) -> str:
+    """Return the kind of a doubt: where more points press than a facet has, most of the force is found."""
+    pressing = np.count_nonzero(state.contact.normal_force[state.contact.on_pair(number)] > 0.0)
+    few = pressing <= 2 ** (state.scene.dim - 1) or isinstance(doubt, CornerBetweenNodes | CornerKeptAway)
+    return "inside facets" if few else "rough inside facets"
 
 
 def _between_nodes(state: State, number: int, moved: float) -> BetweenNodes | None:

@@ -100,7 +100,7 @@ class Condensations:
 
 
 def regular_factor(
-    schur: np.ndarray, kernel: np.ndarray, typical: float, rounded: float = 1e-12
+    schur: np.ndarray, kernel: np.ndarray, typical: float, rounded: float = 4e-13
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the lower Cholesky factor of S + ρ Q Qᵀ, Q and ρ, overwriting ``schur``.
 
