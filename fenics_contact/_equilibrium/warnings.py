@@ -92,12 +92,15 @@ class ContactWarnings:
             deepest = float(pressed_in[state.contact.on_pair(number)].max(initial=0.0))
             if doubt := _between_nodes(state, number, deepest):
                 peaks.append(doubt)
-                self._log_doubt(state, number, _kind_of_missed(state, number, doubt), doubt.warning)
+                # Load histories pass through first touches: what is pressed is named in the states alone.
+                corner = isinstance(doubt, CornerBetweenNodes | CornerKeptAway)
+                kind = "inside facets" if corner or deepest == 0.0 else "rough inside facets"
+                self._log_doubt(state, number, kind, doubt.warning)
             if deepest <= computed_rounding(scene.bodies[pair.slave.body].mesh.points):
                 continue  # nothing presses
             if peak := coarse_peak(state, number, pressed_in):
                 peaks.append(peak)
-                self._log_doubt(state, *_of_peak(number, peak))
+                self._log_doubt(state, number, "rough peak", peak.warning)
         object.__setattr__(state, "peak_doubts", tuple(peaks))
 
     def warn_of_values(self, scene: Scene, comm: MPI.Comm) -> None:
