@@ -150,7 +150,7 @@ class TangentNewton:
     care: float = 0.1
     patience: int = 4
     caution: float = 0.2
-    stalls: int = 30
+    stalls: int = 4
     room: float = 0.2
     near: float = 1e-2
     least_care: float = 1e-3
@@ -159,7 +159,7 @@ class TangentNewton:
     enough: float = 0.5
     slipped: float = 1e-6
     nested: float = 1e-2
-    rescues: int = 20
+    rescues: int = 1
     few: int = 500
     sharp: float = 1e-9
 
