@@ -146,9 +146,10 @@ def test_one_point_that_presses_rubber_is_in_doubt(caplog: pytest.LogCaptureFixt
         fine = solve_scene(pressed_on_disc(0.3, 0.075, rubber=True), MPI.COMM_SELF)
     assert fine.peak_doubts == ()
     assert caplog.messages == []
-    coarse = solve_scene(pressed_on_disc(0.0, rubber=True), MPI.COMM_SELF)
+    with caplog.at_level(logging.INFO):  # load histories pass through first touches
+        coarse = solve_scene(pressed_on_disc(0.0, rubber=True), MPI.COMM_SELF)
     (doubt,) = coarse.peak_doubts
     assert isinstance(doubt, CoarsePeak)
     assert (doubt.points, doubt.cells) == (1, 1)
-    assert caplog.messages == [doubt.warning]
+    assert doubt.warning in caplog.messages
     assert abs(coarse.contact.force[:, 1].sum() / fine.contact.force[:, 1].sum() - 1.0) > 0.2
