@@ -69,14 +69,17 @@ class BetweenNodes:
     at: tuple[float, ...]
 
     @property
+    def _where(self) -> str:
+        return ", ".join(f"{x:.4g}" for x in self.at)
+
+    @property
     def warning(self) -> str:
         """What is missed, where, and what to do."""
-        where = ", ".join(f"{x:.4g}" for x in self.at)
         return (
-            f"the contact of {self.place} lies between nodes: inside a facet of the slave, at ({where}), "
-            f"surfaces overlap by {self.depth:.2g} more than at its nodes, where they move by "
-            f"{self.moved:.2g} against each other: cells are too large for this contact, and its force, not "
-            "only its largest pressure, may be off by a half or more: refine the meshes there, as "
+            f"the contact of {self.place} lies between nodes: inside a facet of the slave, at "
+            f"({self._where}), surfaces overlap by {self.depth:.2g} more than at its nodes, where they "
+            f"move by {self.moved:.2g} against each other: cells are too large for this contact, and its "
+            "force, not only its largest pressure, may be off by a half or more: refine the meshes there, as "
             f"{CALL} does"
         )
 
@@ -102,12 +105,11 @@ class CornerBetweenNodes(BetweenNodes):
     @property
     def warning(self) -> str:
         """What is missed, where, and what to do."""
-        where = ", ".join(f"{x:.4g}" for x in self.at)
         return (
-            f"the contact of {self.place} lies between nodes: a corner of the master, at ({where}), lies "
-            f"{self.depth:.2g} inside the slave, where it moves by {self.moved:.2g} against it: size and "
-            "direction of the contact force may be wrong: exchange slave and master, as nodes of the slave "
-            f"find the other body, or refine the slave there, as {CALL} does"
+            f"the contact of {self.place} lies between nodes: a corner of the master, at ({self._where}), "
+            f"lies {self.depth:.2g} inside the slave, where it moves by {self.moved:.2g} against it: size "
+            "and direction of the contact force may be wrong: exchange slave and master, as nodes of the "
+            f"slave find the other body, or refine the slave there, as {CALL} does"
         )
 
 
@@ -125,11 +127,11 @@ class CornerKeptAway(BetweenNodes):
     @property
     def warning(self) -> str:
         """What is wrong, where, and what to do."""
-        where = ", ".join(f"{x:.4g}" for x in self.at)
         return (
             f"the contact of {self.place} presses where nothing touches: a corner of the master, at "
-            f"({where}), is kept {self.depth:.2g} away from the slave, where it moves by {self.moved:.2g} "
-            "against it, as cells are too large: size and direction of the contact force may be wrong: "
+            f"({self._where}), is kept {self.depth:.2g} away from the slave, where it moves by "
+            f"{self.moved:.2g} against it, as cells are too large: "
+            "size and direction of the contact force may be wrong: "
             f"exchange slave and master, or refine the slave there, as {CALL} does"
         )
 
