@@ -246,7 +246,7 @@ def test_descriptions_and_fingerprints_contain_it() -> None:
     assert (entry["discretisation"], entry["reason"]) == ("node", "node, as the meshes match")
     assert "a z0 on b z1, without friction, interference measured" in repr(scene)
     assert str(scene.plan().contacts[0]).startswith(
-        "flat on flat; node, as the meshes match; interference measured, in touch within 0.5; facets miss no"
+        "flat on flat; node, as the meshes match; interference measured, in touch within 0.5; no error by"
     )
 
 
