@@ -96,9 +96,8 @@ def between_nodes(state: State, number: int, moved: float = 0.0) -> Missed | Non
     presses = bool(state.contact.normal_force[state.contact.on_pair(number)].any())
     found: Missed | None = None
     with together(comm):
-        undeformed = inside = InsideOf.of(scene, pair)
-        if scene.deforms_much:
-            inside = _where_it_is(state, inside, number)
+        undeformed = InsideOf.of(scene, pair)
+        inside = where_they_are(state, undeformed, number)
         # Round bodies on facets of each other are as far apart as these are from what they stand for.
         known = not (scene.deforms_much and presses and isinstance(pair.master, Surface))
         facets = _near(state, inside, number) if known else np.zeros(0, dtype=np.int64)
@@ -106,18 +105,33 @@ def between_nodes(state: State, number: int, moved: float = 0.0) -> Missed | Non
     with together(comm):
         if comm.rank == 0 and len(facets):
             found = _deepest(inside, undeformed, number, facets, displaced)
-            least = SHARE if presses else ALONE
             if found is not None:
                 found = replace(found, moved=max(found.moved, moved))
-                if found.deepest.missed.max() <= least * found.moved:
+                if found.deepest.missed.max() <= least_depth(found.moved, presses=presses):
                     found = None
     return comm.bcast(found)
 
 
-def _where_it_is(state: State, inside: InsideOf, number: int) -> InsideOf:
+def least_depth(moved: float, *, presses: bool) -> float:
+    """Return the depth between nodes up to which nothing is missed where surfaces move so far, [length]."""
+    return (SHARE if presses else ALONE) * moved
+
+
+def where_they_are(state: State, undeformed: InsideOf, number: int) -> InsideOf:
+    """Return the surfaces of a pair where a state has them, undeformed where displacements are small."""
+    if not state.scene.deforms_much:
+        return undeformed
     points = cast("DeformedState", state).equilibrium.evaluation.contact.points
     assert points is not None
-    return inside.moved(points.coordinates, points.placements[number])
+    return undeformed.moved(points.coordinates, points.placements[number])
+
+
+def displaced_at(state: State, nodes: np.ndarray) -> np.ndarray:
+    """Return the displacements of nodes, zero at others, shape (n_nodes, dim), [length]. Collective."""
+    decomposition, dim = state.torn.decomposition, state.scene.dim
+    displaced = np.zeros((decomposition.tearing.n_nodes, dim))
+    displaced[nodes] = nodal_mean_at(decomposition, state.torn_displacement, nodes)[:, :dim]
+    return displaced
 
 
 def _deepest(
@@ -169,16 +183,13 @@ def _displaced(state: State, inside: InsideOf, facets: np.ndarray) -> np.ndarray
 
     Zero at other nodes, and where bodies are measured where they are.
     """
-    scene, decomposition = state.scene, state.torn.decomposition
-    displaced = np.zeros((decomposition.tearing.n_nodes, scene.dim))
-    if not len(facets) or scene.deforms_much:
-        return displaced
-    master = inside.pair.master
-    other = master.body if isinstance(master, Surface) else getattr(master, "name", "")
-    for name in sorted({inside.pair.slave.body, other} & set(scene.bodies)):  # on all ranks alike
-        nodes = inside.numbers.global_nodes(name, np.arange(scene.bodies[name].mesh.n_nodes))
-        displaced[nodes] = nodal_mean_at(decomposition, state.torn_displacement, nodes)[:, : scene.dim]
-    return displaced
+    nodes, master = [np.zeros(0, dtype=np.int64)], inside.pair.master
+    if len(facets) and not state.scene.deforms_much:
+        other = master.body if isinstance(master, Surface) else getattr(master, "name", "")
+        for name in {inside.pair.slave.body, other} & set(state.scene.bodies):
+            count = state.scene.bodies[name].mesh.n_nodes
+            nodes.append(inside.numbers.global_nodes(name, np.arange(count)))
+    return displaced_at(state, np.unique(np.concatenate(nodes)))
 
 
 class InsideFacets:
@@ -230,7 +241,7 @@ def _pressing(state: State, missed: Missed, busy: np.ndarray) -> InFacets:
     """Return points inside facets that a pair misses; marks them as `busy`, shape (n_points,)."""
     contact, points = state.contact, state.contact.points
     mine = contact.on_pair(missed.number)
-    least = (SHARE if contact.normal_force[mine].any() else ALONE) * missed.moved
+    least = least_depth(missed.moved, presses=bool(contact.normal_force[mine].any()))
     depth = missed.deepest.missed
     total = depth + missed.pressed_in
     relief = RELIEF * np.minimum(missed.bulge, total)
@@ -283,10 +294,9 @@ def _needed_nodes(state: State, at_nodes: ContactPoints) -> np.ndarray:
     which = points.are_inside
     if not len(which):
         return which
-    decomposition, own = state.torn.decomposition, at_nodes.part(which)
+    own = at_nodes.part(which)
     nodes = np.flatnonzero(np.diff(own.jump.tocsc().indptr))
-    displaced = np.zeros((decomposition.tearing.n_nodes, decomposition.tearing.components))
-    displaced[nodes] = nodal_mean_at(decomposition, state.torn_displacement, nodes)
+    displaced = displaced_at(state, nodes)
     closing = np.einsum("nd,nd->n", own.normal, own.relative(displaced))
     gap = own.gap + closing
     return np.asarray(which[gap < -SHARE * np.abs(closing)])

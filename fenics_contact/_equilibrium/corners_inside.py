@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from fenics_contact._equilibrium.between_nodes import displaced_at, least_depth, where_they_are
 from fenics_contact._pairing.inside import InsideOf
-from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import sharp_at
-from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface, corner_places
 from fenics_contact._surfaces.projection import Projection, node_weights, project
 from fenics_contact.errors import together
-from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.resolution import BetweenNodes, CornerBetweenNodes, CornerKeptAway
 from fenics_contact.results.state import State
 
-if TYPE_CHECKING:
-    from fenics_contact.results.deformed_state import DeformedState
-
-#: Depths of corners up to this share of what moves are those of meshes that are fine enough.
-SHARE = 0.1
-#: The same where nothing presses: a contact that would be missed as a whole.
-ALONE = 0.01
 #: Corners that were deeper inside than this many widths of a facet belong to another side of the slave.
 WIDTHS = 0.5
 #: Cosine of the angle up to which a face beside a corner lies flat on the slave, whose nodes find it. Facets
@@ -52,15 +43,14 @@ class _Corners:
     hit: Projection
 
     @classmethod
-    def of(cls, scene: Scene, pair: ContactPair, coordinates: np.ndarray | None) -> _Corners | None:
-        """Find those of a pair, None without any. `coordinates`: of all nodes; None: undeformed."""
+    def of(cls, state: State, number: int) -> _Corners | None:
+        """Find those of a pair where a state has them, None without any."""
+        scene, pair = state.scene, state.scene.contacts[number]
         assert isinstance(pair.master, Surface)
         sharp = np.flatnonzero(sharp_at(scene, pair.master))
         if not len(sharp):
             return None
-        sides = InsideOf.of(scene, pair)
-        if coordinates is not None:
-            sides = sides.moved(coordinates, None)
+        sides = where_they_are(state, InsideOf.of(scene, pair), number)
         master = sides.master
         assert master is not None
         nodes = sides.nodes, sides.numbers.global_nodes(pair.master.body, master.nodes)
@@ -106,21 +96,14 @@ def corner_between_nodes(state: State, number: int) -> BetweenNodes | None:
 
     Collective. None where there is none, and where its gaps are given.
     """
-    scene, decomposition = state.scene, state.torn.decomposition
-    pair, comm = scene.contacts[number], state.torn.decomposition.comm
+    pair, comm = state.scene.contacts[number], state.torn.decomposition.comm
     if pair.within_body or pair.nodes is not None or pair.given_gap or not isinstance(pair.master, Surface):
         return None
-    coordinates = None
-    if scene.deforms_much:
-        points = cast("DeformedState", state).equilibrium.evaluation.contact.points
-        coordinates = None if points is None else points.coordinates
     with together(comm):
-        corners = _Corners.of(scene, pair, coordinates)
+        corners = _Corners.of(state, number)
     if corners is None:
         return None
-    moved = np.zeros((decomposition.tearing.n_nodes, scene.dim))
-    needed = np.concatenate(corners.nodes)
-    moved[needed] = nodal_mean_at(decomposition, state.torn_displacement, needed)[:, : scene.dim]
+    moved = displaced_at(state, np.concatenate(corners.nodes))
     with together(comm):
         found = _doubt(state, number, corners, moved)
     return comm.bcast(found)
@@ -137,7 +120,7 @@ def _doubt(state: State, number: int, corners: _Corners, moved: np.ndarray) -> B
     at_nodes[contact.points.slave[mine]] = contact.gap[mine]
     missed = np.maximum(corners.at_nodes(at_nodes) - gap, 0.0)
     kind: type[BetweenNodes] = CornerBetweenNodes
-    near, least = corners.near(pressing) & np.isfinite(gap), SHARE if len(pressing) else ALONE
+    near = corners.near(pressing) & np.isfinite(gap)
     if near.any() and not missed.any():
         kind = CornerKeptAway
         lowest = corners.lowest_at(pressing, np.zeros_like(moved) if scene.deforms_much else moved)
@@ -145,7 +128,8 @@ def _doubt(state: State, number: int, corners: _Corners, moved: np.ndarray) -> B
         missed = np.where(near & (gap == nearest), max(min(nearest, lowest), 0.0), 0.0)
     at = int(np.argmax(missed))
     far = float(np.abs(closing[missed > 0.0]).max(initial=0.0))
-    if far <= computed_rounding(corners.sides.slave.points) or missed[at] <= least * far:
+    least = least_depth(far, presses=len(pressing) > 0)
+    if far <= computed_rounding(corners.sides.slave.points) or missed[at] <= least:
         return None
     where = tuple(map(float, corners.master.points[corners.node[at]]))
     return kind(scene.contacts[number].place, float(missed[at]), far, where)
@@ -162,4 +146,3 @@ def _lie_flat(master: FacetedSurface, node: np.ndarray, normal: np.ndarray) -> n
     flat = np.zeros(len(node), dtype=bool)
     np.logical_or.at(flat, at, np.einsum("nd,nd->n", areas[facet], normal[at]) <= -FLAT)
     return flat
-
