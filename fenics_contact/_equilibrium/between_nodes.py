@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._pairing.inside import (
@@ -85,31 +86,43 @@ class Missed:
 def between_nodes(state: State, number: int, moved: float = 0.0) -> Missed | None:
     """Return what a pair misses between its nodes by more than a share of what moves. Collective.
 
-    None where it misses nothing, and where its gaps are given.
+    None where it misses nothing, and where its gaps are given. It is looked for once in a state.
 
     `moved`: how far its surfaces move against each other, at least, [length].
     """
+    if number not in state.missed:
+        state.missed[number] = _missed(state, number)
+    missed = cast("Missed | None", state.missed[number])
+    if missed is None:
+        return None
+    missed = replace(missed, moved=max(missed.moved, moved))
+    least = least_depth(missed.moved, presses=_presses(state, number))
+    return missed if missed.deepest.missed.max() > least else None
+
+
+def _missed(state: State, number: int) -> Missed | None:
+    """Return where facets of a pair lie deeper than their nodes, None where none does. Collective."""
     scene, comm = state.scene, state.torn.decomposition.comm
     pair = scene.contacts[number]
     if pair.within_body or pair.nodes is not None or pair.given_gap:
         return None
-    presses = bool(state.contact.normal_force[state.contact.on_pair(number)].any())
     found: Missed | None = None
     with together(comm):
         undeformed = InsideOf.of(scene, pair)
         inside = where_they_are(state, undeformed, number)
         # Round bodies on facets of each other are as far apart as these are from what they stand for.
-        known = not (scene.deforms_much and presses and isinstance(pair.master, Surface))
+        bodies = isinstance(pair.master, Surface)
+        known = not (scene.deforms_much and _presses(state, number) and bodies)
         facets = _near(state, inside, number) if known else np.zeros(0, dtype=np.int64)
     displaced = _displaced(state, inside, facets)
     with together(comm):
         if comm.rank == 0 and len(facets):
             found = _deepest(inside, undeformed, number, facets, displaced)
-            if found is not None:
-                found = replace(found, moved=max(found.moved, moved))
-                if found.deepest.missed.max() <= least_depth(found.moved, presses=presses):
-                    found = None
     return comm.bcast(found)
+
+
+def _presses(state: State, number: int) -> bool:
+    return bool(state.contact.normal_force[state.contact.on_pair(number)].any())
 
 
 def least_depth(moved: float, *, presses: bool) -> float:
@@ -240,19 +253,17 @@ class InsideFacets:
 def _pressing(state: State, missed: Missed, busy: np.ndarray) -> InFacets:
     """Return points inside facets that a pair misses; marks them as `busy`, shape (n_points,)."""
     contact, points = state.contact, state.contact.points
-    mine = contact.on_pair(missed.number)
-    least = least_depth(missed.moved, presses=bool(contact.normal_force[mine].any()))
+    least = least_depth(missed.moved, presses=_presses(state, missed.number))
     depth = missed.deepest.missed
     total = depth + missed.pressed_in
     relief = RELIEF * np.minimum(missed.bulge, total)
-    has = [] if points.slave_facet is None else points.slave_facet[mine]
+    known = InFacets.of(points)
+    has = known.facet[points.pair[known.point] == missed.number]
     excess = np.where(np.isin(missed.deepest.facet, has), 0.0, depth - relief)
-    chosen, much = list[tuple[int, int]](), excess > LEFT_CLOSED * total
-    for entry in _apart(missed, (excess > LEFT * total) & (depth > least)):
-        point = _free_point(missed, entry, contact, busy, may_press=bool(much[entry]))
-        if point >= 0:
-            chosen.append((entry, point))
-    entries, which = np.array(chosen, dtype=np.int64).reshape(-1, 2).T
+    entries = _apart(missed, (excess > LEFT * total) & (depth > least))
+    which = _free_points(missed, entries, contact, busy, excess[entries] > LEFT_CLOSED * total[entries])
+    entries, which = entries[which >= 0], which[which >= 0]
+    busy[which] = True
     return InFacets(which, missed.deepest.facet[entries], missed.deepest.local[entries], relief[entries])
 
 
@@ -302,34 +313,46 @@ def _needed_nodes(state: State, at_nodes: ContactPoints) -> np.ndarray:
     return np.asarray(which[gap < -SHARE * np.abs(closing)])
 
 
-def _apart(missed: Missed, chosen: np.ndarray) -> list[int]:
+def _apart(missed: Missed, chosen: np.ndarray) -> np.ndarray:
     """Return those of the chosen entries that miss most among their neighbours, deepest first."""
     deepest, facets, depth = missed.deepest, missed.facets, missed.deepest.missed
     order = np.lexsort((deepest.facet, -np.round(depth / depth.max(), 6)))
-    found: list[int] = []
-    for entry in order[chosen[order]]:
-        around = np.isin(facets, facets[entry]).any(axis=1)
-        at_edge = edge_distance(deepest.local[[entry]], facets.shape[1])[0] < EDGE
-        deeper = depth[around].max() > (1.0 + FLAT) * depth[entry]
-        away = np.linalg.norm(missed.places[found] - missed.places[entry], axis=1)
-        if not (at_edge and deeper) and away.min(initial=np.inf) > missed.near[entry]:
-            found.append(int(entry))
-    return found
+    at_nodes = np.zeros(facets.max(initial=-1) + 1)
+    np.maximum.at(at_nodes, facets.ravel(), np.repeat(depth, facets.shape[1]))
+    deeper = at_nodes[facets].max(axis=1) > (1.0 + FLAT) * depth
+    at_edge = edge_distance(deepest.local, facets.shape[1]) < EDGE
+    order = order[(chosen & ~(at_edge & deeper))[order]]
+    places, near = missed.places[order], missed.near[order]
+    one, other = cKDTree(places).query_pairs(near.max(initial=0.0), output_type="ndarray").T
+    same = np.linalg.norm(places[one] - places[other], axis=1) <= near[other]
+    return np.delete(order, np.unique(other[same]))
 
 
-def _free_point(
-    missed: Missed, entry: int, contact: ContactResult, busy: np.ndarray, *, may_press: bool
-) -> int:
-    """Return the point of a node of a facet that one inside it can stand for, busy then; −1 where none can.
+def _free_points(
+    missed: Missed, entries: np.ndarray, contact: ContactResult, busy: np.ndarray, may_press: np.ndarray
+) -> np.ndarray:
+    """Return the points of nodes that ones inside facets can stand for, −1 where none can, shape (n,).
 
-    Of open nodes the nearest one, else, where it `may_press`, the one that presses least.
+    Of open nodes the nearest one, else, where it `may_press`, shape (n,), the one that presses least. First
+    entries choose first.
     """
-    busy_now = busy if may_press else busy | (contact.normal_force > 0.0)
-    mine = np.flatnonzero((contact.points.pair == missed.number) & ~busy_now)
-    weight = np.asarray(missed.points.own[[entry]][:, contact.points.slave[mine]].todense()).ravel()
-    mine, weight = mine[weight > 0.0], np.round(weight[weight > 0.0], 6)
-    if not len(mine):
-        return -1
-    point = int(mine[np.lexsort((-weight, contact.normal_force[mine]))[0]])
-    busy[point] = True
-    return point
+    free = np.full(missed.points.own.shape[1], -1)
+    mine = np.flatnonzero((contact.points.pair == missed.number) & ~busy)
+    free[contact.points.slave[mine]] = mine
+    weights = missed.points.own[entries].tocoo()
+    entry, point, weight = weights.row, free[weights.col], np.round(weights.data, 6)
+    force = np.where(point >= 0, contact.normal_force[point], np.inf)
+    fits = (weights.data > 0.0) & (point >= 0) & (may_press[entry] | (force <= 0.0))
+    order = np.flatnonzero(fits)[np.lexsort((point[fits], -weight[fits], force[fits], entry[fits]))]
+    entry, point = entry[order], point[order]
+    turn, last = np.searchsorted(entry, [np.arange(len(entries)), np.arange(1, len(entries) + 1)])
+    while True:  # those whose point an earlier one has ask for their next one
+        asking = np.flatnonzero(turn < last)
+        first = np.unique(point[turn[asking]], return_index=True)[1]
+        lost = np.delete(asking, first)
+        if not len(lost):
+            break
+        turn[lost] += 1
+    found = np.full(len(entries), -1)
+    found[asking] = point[turn[asking]]
+    return found

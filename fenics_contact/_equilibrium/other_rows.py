@@ -14,7 +14,7 @@ from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Rolle
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.decomposition import Decomposition, prescribed_along
-from fenics_contact.feti.torn import TornSystem, build_torn_system, contacts_alike, with_points
+from fenics_contact.feti.torn import TornSystem, build_torn_system, contacts_alike, with_points_inside
 from fenics_contact.results.state import State
 
 
@@ -104,7 +104,7 @@ def _kept(support: AnySupport, scene: Scene, before: State) -> AnySupport:
 def has_rows_of(state: State, after: TornSystem) -> bool:
     """Return whether the rows of a state are those of a system, which holds the same, with the same pairs."""
     same = state.torn.decomposition is after.decomposition
-    same = same and state.torn.points.inside is None and after.points.inside is None
+    same = same and state.torn.points.are_at_nodes and after.points.are_at_nodes
     return same and contacts_alike(state.scene, after.scene)
 
 
@@ -115,9 +115,7 @@ def on_rows_of(state: State, after: TornSystem) -> tuple[TornSystem, np.ndarray]
     """
     decomposition, displacement = after.decomposition, state.torn_displacement
     scene = replace(state.scene, supports=after.scene.supports, contacts=after.scene.contacts)
-    torn = build_torn_system(scene, decomposition, overlap=True, previous=after)
-    if after.points.inside is not None:
-        torn = with_points(torn, after.points)
+    torn = with_points_inside(build_torn_system(scene, decomposition, overlap=True, previous=after), after)
     now, _ = prescribed_along(scene, decomposition.tearing)
     was = prescribed_as_is(state.torn, displacement, decomposition)
     torn = torn.moved_further(np.nan_to_num(was - now))

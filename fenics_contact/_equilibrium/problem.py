@@ -41,7 +41,13 @@ from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.same_input import check_same_input
-from fenics_contact.feti.torn import TornSystem, build_torn_system, check_apart, with_points
+from fenics_contact.feti.torn import (
+    TornSystem,
+    build_torn_system,
+    check_apart,
+    with_points,
+    with_points_inside,
+)
 from fenics_contact.qp.face_newton import ProjectedCG
 from fenics_contact.qp.in_turn import InTurn
 from fenics_contact.qp.solution import DualSolution
@@ -188,7 +194,7 @@ class LinearEquilibria:
         if isinstance(before, CarriedState):
             scene = before.scene_on(torn.scene)
             was = build_torn_system(scene, self._decomposition, overlap=True, previous=torn)
-            return before.slip_origin(was if torn.points.inside is None else with_points(was, torn.points))
+            return before.slip_origin(with_points_inside(was, torn))
         if has_rows_of(before, torn):
             return before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
         was, multiplier = on_rows_of(before, torn)
@@ -238,12 +244,10 @@ class LinearEquilibria:
         if not stored:
             return self._directly(torn, known)
         with self._timer.phase("assemble"):
-            if places := InFacets.restored(stored):
-                fixed, axes = self._decomposition.fixed, self._decomposition.axes
-                with together(self._decomposition.comm):
-                    points = points_inside(scene, torn.points, places, fixed, axes)
-                torn = with_points(torn, points)
-            torn = with_stored_slip(torn, stored)
+            fixed, axes = self._decomposition.fixed, self._decomposition.axes
+            with together(self._decomposition.comm):
+                points = points_inside(scene, torn.points, InFacets.restored(stored), fixed, axes)
+            torn = with_stored_slip(with_points(torn, points), stored)
         if "coefficient" in stored:
             from fenics_contact._equilibrium.slip_dependence import with_coefficients
 

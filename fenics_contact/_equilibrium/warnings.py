@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -31,7 +32,6 @@ from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.resolution import (
     BetweenNodes,
-    CoarsePeak,
     CornerBetweenNodes,
     CornerKeptAway,
     PeakDoubt,
@@ -47,6 +47,36 @@ FAR = 0.05
 STRAINED = 0.25
 
 _LOG = logging.getLogger(__name__)
+
+
+class Kind(Enum):
+    """What is doubtful about a pair; of each kind a pair is warned of once."""
+
+    SLIDING = auto()
+    FACETS_SLID = auto()
+    PASSING_NODES = auto()
+    OPEN_MEANS = auto()
+    FACETS = auto()
+    OVERLAP = auto()
+    INSIDE_FACETS = auto()
+    PEAK = auto()
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A doubt about a pair.
+
+    Attributes:
+        pair: Its number.
+        kind: What is doubtful.
+        words: The warning.
+        is_small: Whether most of the contact is resolved all the same: that is information, no warning.
+    """
+
+    pair: int
+    kind: Kind
+    words: str
+    is_small: bool = False
 
 
 class ContactWarnings:
@@ -74,9 +104,9 @@ class ContactWarnings:
             if design and self._points is not None:
                 return
             found, peaks = self._doubts(state)
-            for pair, kind, words in found:
-                if not (design and kind == "overlap"):
-                    self._log_doubt(state, pair, kind, words)
+            for doubt in found:
+                if not (design and doubt.kind is Kind.OVERLAP):
+                    self._log_doubt(state, doubt)
             object.__setattr__(state, "peak_doubts", peaks)
         else:
             self._warn_of_deformed(state)
@@ -88,19 +118,18 @@ class ContactWarnings:
         peaks, scene, pressed_in = list[PeakDoubt](), state.scene, _indentation(state)
         for number, pair in enumerate(scene.contacts):
             for each in [] if scene.deforms_much else _slid_far(state, number):
-                self._log_doubt(state, *each)
+                self._log_doubt(state, each)
             deepest = float(pressed_in[state.contact.on_pair(number)].max(initial=0.0))
             if doubt := _between_nodes(state, number, deepest):
                 peaks.append(doubt)
                 # Load histories pass through first touches: what is pressed is named in the states alone.
-                corner = isinstance(doubt, CornerBetweenNodes | CornerKeptAway)
-                kind = "inside facets" if corner or deepest == 0.0 else "rough inside facets"
-                self._log_doubt(state, number, kind, doubt.warning)
+                small = deepest > 0.0 and not isinstance(doubt, CornerBetweenNodes | CornerKeptAway)
+                self._log_doubt(state, Doubt(number, Kind.INSIDE_FACETS, doubt.warning, small))
             if deepest <= computed_rounding(scene.bodies[pair.slave.body].mesh.points):
                 continue  # nothing presses
             if peak := coarse_peak(state, number, pressed_in):
                 peaks.append(peak)
-                self._log_doubt(state, number, "rough peak", peak.warning)
+                self._log_doubt(state, Doubt(number, Kind.PEAK, peak.warning, is_small=True))
         object.__setattr__(state, "peak_doubts", tuple(peaks))
 
     def warn_of_values(self, scene: Scene, comm: MPI.Comm) -> None:
@@ -112,7 +141,7 @@ class ContactWarnings:
 
     def overlaps(self, state: LinearState) -> tuple[str, ...]:
         """Return words about the pairs whose surfaces overlap before they are loaded. Collective."""
-        return tuple(words for _, kind, words in self._doubts(state)[0] if kind == "overlap")
+        return tuple(each.words for each in self._doubts(state)[0] if each.kind is Kind.OVERLAP)
 
     def _log(self, state: State, key: Hashable, words: str, log: Callable[..., None] | None = None) -> None:
         if key not in self._given and state.torn.decomposition.comm.rank == 0:
@@ -122,17 +151,18 @@ class ContactWarnings:
                 self._held.append((log or _LOG.warning, words))
         self._given.add(key)
 
-    def _log_doubt(self, state: State, pair: int, kind: str, words: str) -> None:
-        self._log(state, (pair, kind), words, _LOG.info if kind.startswith("rough") else None)
+    def _log_doubt(self, state: State, doubt: Doubt) -> None:
+        key = doubt.pair, doubt.kind, doubt.is_small
+        self._log(state, key, doubt.words, _LOG.info if doubt.is_small else None)
 
     def tell(self) -> None:
         """Log the warnings about the last state that were held back."""
         for log, words in self._held or ():
             safe_log(log, "%s", words)
 
-    def _doubts(self, state: LinearState) -> tuple[list[tuple[int, str, str]], tuple[PeakDoubt, ...]]:
-        """Return pair, kind and words of all doubts about a state, and those about peaks. Collective."""
-        torn, contact, found = state.torn, state.contact, list[tuple[int, str, str]]()
+    def _doubts(self, state: LinearState) -> tuple[list[Doubt], tuple[PeakDoubt, ...]]:
+        """Return all doubts about a state, and those about peaks. Collective."""
+        torn, contact, found = state.torn, state.contact, list[Doubt]()
         peaks = list[PeakDoubt]()
         if contact.points.count == 0:
             return found, ()
@@ -154,17 +184,17 @@ class ContactWarnings:
             doubt = None if error > SHARE * moved else _between_nodes(state, number, moved)
             if doubt is not None:
                 peaks.append(doubt)
-                found.append((number, _kind_of_missed(state, number, doubt), doubt.warning))
+                found.append(_of_missed(state, number, doubt))
             if error > SHARE * moved:  # which points press is not known then
-                found.append((number, "facets", _words_of_facets(pair, error, moved)))
+                found.append(Doubt(number, Kind.FACETS, _words_of_facets(pair, error, moved)))
             elif peak := coarse_peak(state, number, pressed_in):
                 peaks.append(peak)
-                found.append(_of_peak(number, peak))
+                found.append(Doubt(number, Kind.PEAK, peak.warning, peak.cells > 1))
             elif unmatched := unmatched_nodes(state, number):
                 peaks.append(unmatched)
             overlap = -float(before[touching].min(initial=0.0))
             if overlap > max(error, SHARE * moved):
-                found.append((number, "overlap", _words_of_overlap(pair, overlap, moved)))
+                found.append(Doubt(number, Kind.OVERLAP, _words_of_overlap(pair, overlap, moved)))
         return found, tuple(peaks)
 
     def _warn_of_large_rotations(self, state: State) -> None:
@@ -319,7 +349,7 @@ def _words_of_strain(name: str, strain: float) -> str:
     )
 
 
-def _slid_far(state: State, number: int) -> list[tuple[int, str, str]]:
+def _slid_far(state: State, number: int) -> list[Doubt]:
     """Return the doubt about a pair whose points slide farther than they may, where there is one.
 
     Points that press may slide by a facet of the master, all of them across the slave's surface.
@@ -334,11 +364,12 @@ def _slid_far(state: State, number: int) -> list[tuple[int, str, str]]:
     places = mesh.points[np.unique(mesh.surfaces[pair.slave.name])]
     farthest, reach = float(slid.max(initial=0.0)), float(np.linalg.norm(np.ptp(places, axis=0)))
     if farthest > reach:
-        return [(number, "sliding", _words_of_sliding(pair, farthest, reach))]
+        return [Doubt(number, Kind.SLIDING, _words_of_sliding(pair, farthest, reach))]
     master = scene.bodies[pair.master.body].mesh
     area = float(share_areas(master, pair.master.name).sum()) / len(master.surfaces[pair.master.name])
     pressed, facet = slid[contact.normal_force[mine] > 0.0].max(initial=0.0), area ** (1.0 / (scene.dim - 1))
-    return [(number, "facets slid", _words_of_facets_slid(pair, pressed, facet))] if pressed > facet else []
+    words = _words_of_facets_slid(pair, pressed, facet)
+    return [Doubt(number, Kind.FACETS_SLID, words)] if pressed > facet else []
 
 
 def _words_of_facets_slid(pair: ContactPair, slid: float, facet: float) -> str:
@@ -364,11 +395,6 @@ def _indentation(state: State) -> np.ndarray:
     return np.asarray(state.contact.normal_force / stiffness)
 
 
-def _of_peak(number: int, peak: CoarsePeak) -> tuple[int, str, str]:
-    """Return a pair, the kind of the doubt about its peak, and words."""
-    return number, "peak" if peak.cells == 1 else "rough peak", peak.warning
-
-
 def _largest_motion(closing: np.ndarray, pressed_in: np.ndarray, touching: np.ndarray) -> float:
     """Return how far surfaces move against each other where they touch, anywhere if they do not, [length].
 
@@ -379,11 +405,11 @@ def _largest_motion(closing: np.ndarray, pressed_in: np.ndarray, touching: np.nd
     return float(max(np.abs(closing[touching]).max(), pressed_in[touching].max()))
 
 
-def _kind_of_missed(state: State, number: int, doubt: BetweenNodes) -> str:
-    """Return the kind of a doubt: where more points press than a facet has, most of the force is found."""
+def _of_missed(state: State, number: int, doubt: BetweenNodes) -> Doubt:
+    """Return the doubt, a small one where more points press than a facet has: most of the force is found."""
     pressing = np.count_nonzero(state.contact.normal_force[state.contact.on_pair(number)] > 0.0)
     few = pressing <= 2 ** (state.scene.dim - 1) or isinstance(doubt, CornerBetweenNodes | CornerKeptAway)
-    return "inside facets" if few else "rough inside facets"
+    return Doubt(number, Kind.INSIDE_FACETS, doubt.warning, not few)
 
 
 def _between_nodes(state: State, number: int, moved: float) -> BetweenNodes | None:
@@ -424,7 +450,7 @@ def _finer_gap(torn: TornSystem) -> np.ndarray:
         return torn.points.gap
 
 
-def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, str, str]]:
+def _passing_nodes(state: State, number: int, moved: float) -> list[Doubt]:
     """Return the doubt about a pair whose master passes between the nodes of its slave. Collective.
 
     `moved`: how far its surfaces move against each other, [length].
@@ -442,10 +468,10 @@ def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, s
         f"{deep:.2g}, where surfaces move by {moved:.2g} against each other: refine the slave, or let the "
         "finer surface be the slave; discretisation='mortar' has no such error"
     )
-    return [(number, "between nodes", words)]
+    return [Doubt(number, Kind.PASSING_NODES, words)]
 
 
-def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> list[tuple[int, str, str]]:
+def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> list[Doubt]:
     """Return the doubt about a pair by mortar that nothing closes although nodes lie inside the master.
 
     A round body on coarse facets is so, as means over its facets are open where its lowest node is not.
@@ -471,7 +497,7 @@ def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> l
         f"inside the master, where surfaces move by {moved:.2g} against each other: the facets are too large "
         "for this contact, refine them there; discretisation='node' closes single nodes"
     )
-    return [(number, "open means", words)]
+    return [Doubt(number, Kind.OPEN_MEANS, words)]
 
 
 def _moves(state: State, surface: Surface) -> np.ndarray:

@@ -366,11 +366,10 @@ class InFacets:
         return {f"inside.{name}": getattr(self, name) for name in self._NAMES} if len(self.point) else {}
 
     @classmethod
-    def restored(cls, stored: Mapping[str, np.ndarray]) -> InFacets | None:
-        """Return those of `stored`, None where there are none."""
-        if "inside.point" not in stored:
-            return None
-        return cls(*(stored[f"inside.{name}"] for name in cls._NAMES))
+    def restored(cls, stored: Mapping[str, np.ndarray]) -> InFacets:
+        """Return those of `stored`."""
+        nothing = np.zeros(0, dtype=np.int64)
+        return cls(*(stored.get(f"inside.{name}", nothing) for name in cls._NAMES))
 
     def part(self, chosen: np.ndarray) -> InFacets:
         """Return some of them, by indices or a mask."""

@@ -127,6 +127,11 @@ class ContactPoints:
         """Numbers of the points that lie inside a facet of the slave, shape (k,)."""
         return np.flatnonzero(np.zeros(0) if self.slave_facet is None else self.slave_facet >= 0)
 
+    @property
+    def are_at_nodes(self) -> bool:
+        """Whether none of the points lies inside a facet of the slave."""
+        return not len(self.are_inside)
+
     @cached_property
     def jump(self) -> sp.csr_matrix:
         """Weights of the nodes in slave minus master displacement, shape (n, n_nodes)."""

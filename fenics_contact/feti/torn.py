@@ -511,6 +511,8 @@ def build_torn_system(
 
 def with_points(torn: TornSystem, points: ContactPoints) -> TornSystem:
     """Return a system without fluid in which slip begins anew, with other contact points. Collective."""
+    if points is torn.points:
+        return torn
     scene, decomposition = torn.scene, torn.decomposition
     prescribed, _ = prescribed_along(scene, decomposition.tearing)
     system = _with_rows(
@@ -518,6 +520,11 @@ def with_points(torn: TornSystem, points: ContactPoints) -> TornSystem:
         constraints=torn.constraints,
     )  # fmt: skip
     return _with_right_sides(system, prescribed, free_motions(scene, decomposition.tearing))
+
+
+def with_points_inside(torn: TornSystem, other: TornSystem) -> TornSystem:
+    """Return a system with points inside facets where another one has them. Collective."""
+    return torn if other.points.are_at_nodes else with_points(torn, other.points)
 
 
 def _with_right_sides(system: TornSystem, prescribed: np.ndarray, free: FreeMotions) -> TornSystem:
@@ -561,8 +568,7 @@ def _meets_alike(scene: Scene, decomposition: Decomposition, known: TornSystem) 
         for each in (scene, known.scene)
     ]
     same = scene.has_meshes_of(known.scene) and known.decomposition is decomposition
-    same = same and known.points.inside is None
-    return same and rest[0] == rest[1] and contacts_alike(scene, known.scene)
+    return same and known.points.are_at_nodes and rest[0] == rest[1] and contacts_alike(scene, known.scene)
 
 
 def contacts_alike(scene: Scene, other: Scene) -> bool:

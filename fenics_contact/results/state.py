@@ -239,6 +239,7 @@ class State(ABC):
     tolerance: Tolerance = None
     known_errors: StateErrors | None = field(default=None, repr=False)
     peak_doubts: tuple[PeakDoubt, ...] = field(default=(), repr=False)
+    missed: dict[int, object] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
         """List what was found and what it cost, without communication: any rank may print alone."""
