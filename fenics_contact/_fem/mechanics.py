@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Protocol
 
@@ -108,6 +108,8 @@ class Response:
         history: Internal variables at the end of the step, shape (n_cells, n_gauss, k); None without any.
         stress: Cauchy stress at the Gauss points of materials with a history, [force / length²], shape
             (n_cells, n_gauss, 3, 3), NaN in cells of other materials; None without any.
+        by_stress: Assembles the part of `stiffness` that is due to stresses as they turn with the cells;
+            None where tangents at rest are a measure of what materials resist.
     """
 
     force: np.ndarray
@@ -116,11 +118,21 @@ class Response:
     least_jacobian: float
     history: np.ndarray | None = None
     stress: np.ndarray | None = None
+    by_stress: Callable[[], sp.csr_matrix] | None = None
 
     @cached_property
     def stiffness(self) -> sp.csr_matrix:
         """Tangent ∂f/∂u, shape (dim n, dim n), [force / length]; assembled on first use."""
         return self.tangent()
+
+    def with_matrices(self, mapped: Callable[[sp.csr_matrix], sp.csr_matrix]) -> Response:
+        """Return it with other matrices by those of now."""
+        turning = self.by_stress
+        return replace(
+            self,
+            tangent=lambda: mapped(self.stiffness),
+            by_stress=None if turning is None else lambda: mapped(turning()),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +242,18 @@ class HistoryMechanics:
             least_jacobian=self.least_jacobian(displacement),
             history=after,
             stress=stress,
+            by_stress=partial(self._by_stress, gradient, stress) if rest is None else None,
         )
+
+    def _by_stress(self, gradient: np.ndarray, stress: np.ndarray) -> sp.csr_matrix:
+        """Return ∫ ∇v S : ∇u, S = det F F⁻¹σF⁻ᵀ; see `Response.by_stress`."""
+        entries = np.zeros(self._gauss.entries)
+        for material, cells in self._parts:
+            if material.finite and len(cells):
+                second = second_piola_kirchhoff(stress[cells], gradient[cells])
+                tangent = np.einsum("ik,...jl->...ijkl", np.eye(3), second)
+                entries += self._gauss.stiffness(tangent, cells)
+        return self._gauss.assembled(entries)
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
         """Return the smallest det F; see `Mechanics.least_jacobian`."""
@@ -280,6 +303,13 @@ def cauchy(nominal: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """Return P Fᵀ / det F by the first Piola-Kirchhoff stress and the displacement gradient, (..., 3, 3)."""
     F = np.eye(3) + gradient
     return np.asarray(nominal @ F.swapaxes(-1, -2) / determinants(F)[..., None, None])
+
+
+def second_piola_kirchhoff(stress: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Return det F F⁻¹σF⁻ᵀ by the Cauchy stress and the displacement gradient, (..., 3, 3)."""
+    F = np.eye(3) + gradient
+    inverse = np.linalg.inv(F)
+    return np.asarray(determinants(F)[..., None, None] * (inverse @ stress @ inverse.swapaxes(-1, -2)))
 
 
 class HyperelasticMechanics:

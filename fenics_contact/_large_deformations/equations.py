@@ -265,7 +265,13 @@ class ResidualState:
         if diagonal is not None:
             diagonal = np.concatenate([diagonal, np.ones(further.count)])
         earlier = {} if known is None else known.system.operators
-        return Linearisation(TangentSystem(increments, timer, diagonal=diagonal, earlier=earlier), further)
+        by_stress = {
+            subdomain.mesh.number: response.by_stress
+            for subdomain, response in zip(torn.subdomains, self.responses, strict=True)
+            if response.by_stress is not None
+        }
+        system = TangentSystem(increments, timer, diagonal=diagonal, earlier=earlier, by_stress=by_stress)
+        return Linearisation(system, further)
 
 
 @displayed
@@ -448,7 +454,7 @@ class _OfSeveralShapes:
         origin = None if step.origin is None else mesh.on_space(step.origin)
         response = self.mechanics.at(mesh.on_space(displacement), replace(step, origin=origin))
         force = mesh.force_of(response.force)
-        return replace(response, force=force, tangent=lambda: mesh.matrix_of(response.stiffness))
+        return replace(response, force=force).with_matrices(mesh.matrix_of)
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
         return self.mechanics.least_jacobian(self.mesh.on_space(displacement))
@@ -459,11 +465,7 @@ def _following(response: Response, mesh: SubdomainMesh) -> Response:
     following = mesh.following
     if following is None:
         return response
-    return replace(
-        response,
-        force=following.force(response.force),
-        tangent=lambda: following.stiffness(response.stiffness),
-    )
+    return replace(response, force=following.force(response.force)).with_matrices(following.stiffness)
 
 
 def _on_bed(response: Response, bed: sp.csr_matrix | None, displacement: Vector) -> Response:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -123,6 +123,10 @@ def mostly_positive(matrix: sp.csr_matrix, unused: RefillableFactor | None) -> R
     return unused if unused.fits(matrix) else with_inertia(matrix, None)
 
 
+#: Assembles the part of a tangent that is due to stresses as they turn with the cells.
+StressStiffness = Callable[[], sp.csr_matrix]
+
+
 class TangentOperator(FactoredOperator):
     """K_ρ⁻¹ with K_ρ = K + C Cᵀ, and a Schur complement on the interface, for a symmetric tangent K.
 
@@ -156,8 +160,14 @@ class TangentOperator(FactoredOperator):
     #: and of later ones, which start from what was found before.
     later_sweeps = 2
 
-    def __init__(self, subdomain: Subdomain, interface: np.ndarray, earlier: TangentOperator | None) -> None:
-        """Factor a subdomain."""
+    def __init__(
+        self,
+        subdomain: Subdomain,
+        interface: np.ndarray,
+        earlier: TangentOperator | None,
+        by_stress: StressStiffness | None = None,
+    ) -> None:
+        """Factor a subdomain; ``by_stress`` assembles the part of its tangent that is due to stress."""
         K, size = subdomain.stiffness, subdomain.mesh.size
         typical = float(np.abs(K.diagonal()).max())
         self._fixing = _well_spread(subdomain.points) if earlier is None else earlier._fixing
@@ -168,7 +178,7 @@ class TangentOperator(FactoredOperator):
         columns = np.zeros((size, basis.shape[1]))
         columns[dofs] = basis
         weights = np.full(basis.shape[1], typical)
-        soft, grip = self._soft_motions(held, factor, earlier, typical)
+        soft, grip = self._soft_motions(held, factor, earlier, typical, by_stress)
         self.softened = soft.shape[1]
         whole = _Updated(factor, soft, np.diag(grip))
         columns, weights = np.hstack([columns, soft]), np.concatenate([weights, grip])
@@ -188,7 +198,12 @@ class TangentOperator(FactoredOperator):
         self._released = self._factors
 
     def _soft_motions(
-        self, held: sp.csr_matrix, factor: IndefiniteFactor, earlier: TangentOperator | None, typical: float
+        self,
+        held: sp.csr_matrix,
+        factor: IndefiniteFactor,
+        earlier: TangentOperator | None,
+        typical: float,
+        by_stress: StressStiffness | None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return motions that need columns of their own, shape (n, k), and the stiffness of each."""
         probes = np.random.default_rng(0).standard_normal((factor.size, self.probes))
@@ -201,6 +216,10 @@ class TangentOperator(FactoredOperator):
         if earlier is None:
             self._softest = float(np.abs(values).min())
         soft = values < self.soft * self._softest
+        if by_stress is not None and soft.any():
+            # What materials themselves resist less, as beyond yield, stress has not softened.
+            turning = np.einsum("ik,ik->k", vectors, by_stress() @ vectors)
+            soft &= values < np.maximum(self.soft * (values - turning), 0.0)
         self._searched = vectors[:, soft]
         return self._searched, self.grip * np.maximum(-values[soft], 0.0) + self.least_grip * typical
 
@@ -302,16 +321,21 @@ class TangentInverse(TornInverse):
     """K_ρ⁻¹ of this rank's subdomains, with the modes and their stiffness."""
 
     def __init__(
-        self, torn: TornSystem, condensations: Condensations, earlier: Mapping[int, TangentOperator]
+        self,
+        torn: TornSystem,
+        condensations: Condensations,
+        earlier: Mapping[int, TangentOperator],
+        by_stress: Mapping[int, StressStiffness],
     ) -> None:
         """Factor the tangents; ``earlier`` has operators of an earlier shape by number of subdomain."""
-        self._earlier = earlier
+        self._earlier, self._by_stress = earlier, by_stress
         super().__init__(torn.subdomains, torn.B, condensations, kind=LocalKind.IMPLICIT, shared=False)
 
     def _factor(
         self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations
     ) -> LocalOperator:
-        return TangentOperator(subdomain, interface, self._earlier.get(subdomain.mesh.number))
+        number = subdomain.mesh.number
+        return TangentOperator(subdomain, interface, self._earlier.get(number), self._by_stress.get(number))
 
     @property
     def tangents(self) -> Sequence[TangentOperator]:
@@ -345,16 +369,17 @@ class TangentSystem(DualSystem):
         *,
         diagonal: np.ndarray | None = None,
         earlier: Mapping[int, TangentOperator] | None = None,
+        by_stress: Mapping[int, StressStiffness] | None = None,
     ) -> None:
         """Factor the tangents and assemble d, G, S, e. Collective."""
-        self._known_diagonal, self._earlier = diagonal, earlier or {}
+        self._known_diagonal, self._earlier, self._by_stress = diagonal, earlier or {}, by_stress or {}
         super().__init__(torn, timer, kind=LocalKind.IMPLICIT)
 
     def _inverse(
         self, torn: TornSystem, condensations: Condensations, kind: LocalKind, known: TornInverse | None
     ) -> TornInverse:
-        inverse = TangentInverse(torn, condensations, self._earlier)
-        self._earlier = {}  # a history must not keep all its linearisations
+        inverse = TangentInverse(torn, condensations, self._earlier, self._by_stress)
+        self._earlier, self._by_stress = {}, {}  # a history must not keep all its linearisations
         parts = zip(torn.subdomains, inverse.tangents, strict=True)
         subdomains = tuple(replace(subdomain, kernel=operator.modes) for subdomain, operator in parts)
         self.torn = replace(torn, subdomains=subdomains)

@@ -65,6 +65,23 @@ def test_stiffness_is_the_derivative_of_the_force(material: HistoryMaterial, cel
 
 
 @pytest.mark.parametrize("cell", CELLS)
+def test_a_rotation_costs_only_what_stresses_take_to_turn_with_it(cell: str) -> None:
+    """Materials do not resist it: K ω×x is that of the stresses, of whatever size these are."""
+    patch = patch_of(Body(skew_patch(cell), LARGE))
+    u = smooth_field(patch.points, 0.2)
+    found, about_z = answer(patch, u), np.zeros(u.shape)
+    about_z[:, 0], about_z[:, 1] = -(patch.points + u)[:, 1], (patch.points + u)[:, 0]
+    whole, turning = (K @ about_z.ravel() for K in (found.stiffness, found.by_stress()))
+    assert np.abs(turning).max() > 1e-3 * np.abs(found.stiffness).max()
+    np.testing.assert_allclose(whole, turning, atol=1e-11 * np.abs(found.stiffness).max())
+    small = answer(patch_of(Body(skew_patch(cell), SMALL)), u)
+    assert small.by_stress().nnz == small.stiffness.nnz
+    assert np.abs(small.by_stress()).max() == 0.0
+    mixed = Body(in_halves(skew_patch(cell)), {"left": LARGE, "right": NeoHooke(1.0, 0.3)})
+    assert answer(patch_of(mixed), u).by_stress is None
+
+
+@pytest.mark.parametrize("cell", CELLS)
 def test_the_unloaded_body_is_linearly_elastic_of_one_pattern(cell: str) -> None:
     patch = patch_of(Body(skew_patch(cell), LARGE))
     first, linear = answer(patch, np.zeros(patch.mesh.size)), patch.linear_stiffness()

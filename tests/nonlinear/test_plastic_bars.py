@@ -38,6 +38,15 @@ def test_a_bar_by_true_stresses_is_drawn_in_one_step(cells: tuple[int, int, int]
     assert state.fractions == (1.0,)
 
 
+@pytest.mark.parametrize("law", [FinitePlasticity, NeoHookeanPlasticity])
+@pytest.mark.parametrize("stretch", [1.1, 0.9])
+def test_metal_beyond_yield_has_no_more_motions_that_stress_softens(law: type, stretch: float) -> None:
+    """Its stiffness falls alike in all motions, by a hundred: none needs a column that holds it."""
+    state = drawn(law(YOUNG, 0.3, YIELD, isotropic_hardening=1500.0), (8, 4, 4), 2, stretch)
+    assert state.equilibrium.linearisation.system.softened == 0
+    assert state.fractions == (1.0,)
+
+
 def drawn(law: object, cells: tuple[int, int, int], boxes: int, stretch: float) -> DeformedState:
     mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), cells)
     supports = [
