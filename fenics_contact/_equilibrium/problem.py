@@ -53,7 +53,7 @@ from fenics_contact.qp.in_turn import InTurn
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.contact import no_contact
-from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
+from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual, sticking
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.preloads import shortenings
 from fenics_contact.results.state import State, Tolerance, checked_tolerance, compute_energies
@@ -196,7 +196,9 @@ class LinearEquilibria:
             was = build_torn_system(scene, self._decomposition, overlap=True, previous=torn)
             return before.slip_origin(with_points_inside(was, torn))
         if has_rows_of(before, torn):
-            return before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
+            own = before.torn
+            sticks = sticking(own, before.rows) if own.tangential_rows.size else False
+            return own.slip_origin(before.torn_displacement, before.solution.multiplier, sticks)
         was, multiplier = on_rows_of(before, torn)
         return was.slip_origin(before.torn_displacement, multiplier)
 

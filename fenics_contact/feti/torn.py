@@ -241,17 +241,21 @@ class TornSystem:
             return work
         return work + float(self.free.load @ self.free_motion(self.right - self.jump(displacement)))
 
-    def slip_origin(self, displacement: np.ndarray, multiplier: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def slip_origin(
+        self, displacement: np.ndarray, multiplier: np.ndarray, sticks: np.ndarray | bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return from where a next load step measures slip, for `with_slip_from`. Collective.
 
-        Elastic slip springs back: it is part of the next step's, whose friction begins as it is.
+        Elastic slip springs back: it is part of the next step's, whose friction begins as it is. What sticks
+        has not slipped: its jumps are errors of the solver, and forces of a later step would follow them.
 
-        `displacement`: torn, of this rank, shape (torn_size,), [length]; `multiplier`: λ, owned.
+        `displacement`: torn, of this rank, shape (torn_size,), [length]; `multiplier`: λ, owned; `sticks`:
+        marks of the rows of points that are known to stick, owned.
         """
         relative, compliance = self.relative(displacement), self.compliance
         if compliance is not None:
             relative = relative - compliance.given_way(multiplier)
-        return relative, self.sliding(displacement)
+        return np.where(sticks, self.right + self.supported, relative), self.sliding(displacement)
 
     def with_slip_from(self, relative: np.ndarray, slid: np.ndarray) -> TornSystem:
         """Return the system in which slip is measured from an earlier displacement.

@@ -45,6 +45,17 @@ def row_values(system: DualSystem, solution: DualSolution) -> RowValues:
     )  # fmt: skip
 
 
+def sticking(torn: TornSystem, values: RowValues) -> np.ndarray:
+    """Return marks of the friction rows of points that do not slip, open ones included, owned."""
+    rows, discs = torn.layout.tangential, torn.owned_discs
+    step = values.step[rows[:, 0]]
+    elastic = 0.0 if torn.elastic_slip is None else torn.elastic_slip[discs]
+    trial = values.multiplier[rows] - step[:, None] * values.residual[rows]
+    sticks = np.zeros(torn.layout.size, dtype=bool)
+    sticks[rows[np.linalg.norm(trial, axis=1) < values.slip_bound * (1.0 + step * elastic)]] = True
+    return sticks
+
+
 def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray) -> ContactResult:
     """Gather forces, gaps and status of all contact points on every rank. Collective."""
     rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])

@@ -16,6 +16,7 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     Checkpoint,
+    ContactPair,
     ContactProblem,
     Coulomb,
     FixedPoint,
@@ -25,6 +26,8 @@ from fenics_contact import (
     State,
     Status,
     Support,
+    Surface,
+    TotalForce,
     Traction,
     Tresca,
     box_partition,
@@ -114,6 +117,27 @@ def test_a_single_step_is_the_scene_at_once() -> None:
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
     once = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=TOLERANCE))
     np.testing.assert_allclose(state.contact.force, once.contact.force, atol=1e-12)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-9])
+def test_what_sticks_has_not_slipped_and_is_let_go_without_any_force(tolerance: float) -> None:
+    """Errors of the solver are no slip: the next load step would have forces that are nothing but these."""
+    blocks = {"low": block((0.0,) * 3, (2.0, 2.0, 1.0), (3, 3, 1)),
+              "up": block((0.0, 0.0, 1.0), (2.0, 2.0, 1.8), (2, 2, 1))}  # fmt: skip
+    pair = ContactPair(Surface("up", "z0"), Surface("low", "z1"), Tresca(0.05), "node")
+    bodies = {name: Body(mesh, IsotropicElasticity(1.0, 0.3)) for name, mesh in blocks.items()}
+    scene = Scene(bodies, [Support("low", "z0")], contacts=[pair])
+    press = TotalForce("up", "z1", (0.001, 0.0, -0.02))
+    loads = {"pressed": [press], "let go": [], "still": [], "pressed again": [press]}
+    steps = [LoadStep(name, each) for name, each in loads.items()]
+    problem = ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=tolerance)
+    pressed, *after, again = solve_steps(problem, steps)
+    assert pressed.contact.count(Status.STICK) == pressed.contact.points.count
+    assert np.abs(pressed.contact.slip).max() > 0.0
+    for state in after:
+        assert not state.contact.force.any()
+        assert max(np.abs(state.gather_displacement(name)).max() for name in bodies) < 1e-13
+    assert not again.contact.slip_before.any()
 
 
 def test_without_a_reversal_the_number_of_steps_matters_little_with_tresca() -> None:
