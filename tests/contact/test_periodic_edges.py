@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -100,6 +101,32 @@ def test_tied_periodic_layers_are_one() -> None:
     assert state.torn.ties.count == 4
     below = state.reactions()["low z0"].force
     assert below[2] == pytest.approx(SUNK * stiffness("normal"), rel=1e-7)
+
+
+@pytest.mark.parametrize(("count", "cells"), [(2, "tetrahedron"), (3, "hexahedron"), (5, "tetrahedron")])
+@pytest.mark.parametrize("mu", [0.05, 0.9])
+def test_points_at_periodic_edges_are_means_over_both_sides_where_meshes_differ(
+    count: int, cells: Literal["hexahedron", "tetrahedron"], mu: float
+) -> None:
+    """By mortar their rows differ, as facets at both edges do, and yet depend on each other."""
+    scene = stack(3, second=False, mu=mu)
+    finer = block((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (count, count, 1), cells)
+    other = replace(scene, bodies={**scene.bodies, "low": Body(finer, LAWS["low"])})
+    held = [Support("low", "z0"), Support("up", "z1", (DRAWN, 0.0, -SUNK))]
+    contact = solve_scene(replace(other, supports=held), MPI.COMM_SELF, tolerance=1e-10).contact
+    assert contact.points.count == 4
+    pressure = SUNK * stiffness("normal")
+    np.testing.assert_allclose(contact.normal_force, 0.25 * pressure, rtol=1e-7)
+    shear = min(mu * pressure, DRAWN * stiffness("shear"))
+    np.testing.assert_allclose(np.linalg.norm(contact.friction_force, axis=1), 0.25 * shear, rtol=1e-6)
+
+
+@pytest.mark.parametrize("periodic", ["up", "low"])
+def test_edges_of_a_periodic_body_on_one_that_is_not_are_two_places(periodic: str) -> None:
+    for kind in ("mortar", "node"):
+        scene = stack(2, second=False, kind=kind)
+        scene = replace(scene, constraints=alike(periodic))
+        assert solve_scene(scene, MPI.COMM_SELF).contact.points.count == 9
 
 
 @pytest.mark.parametrize("law", [None, Coulomb(0.3)])
