@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigvalsh
 
-from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
+from fenics_contact._adaptive.refined_scene import SceneRefinement, refined_again
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Support
@@ -26,14 +26,11 @@ def refined_at_crossings(found: SceneRefinement, halvings: int = 3) -> SceneRefi
 
     `found`: the meshes; `halvings`: how often the cells around crossings are halved.
     """
-    for _ in range(halvings):
-        supports = found.scene.supports
-        around = {name: around_crossings(body, _of(name, supports)) for name, body in _bodies(found.scene)}
-        marked = {name: cells for name, cells in around.items() if len(cells)}
-        if not marked:
-            break
-        found = refine_scene(found.scene, marked).after(found)
-    return found
+
+    def around(scene: Scene) -> Mapping[str, np.ndarray]:
+        return {name: around_crossings(body, _of(name, scene.supports)) for name, body in _bodies(scene)}
+
+    return refined_again(found, around, halvings)
 
 
 def around_crossings(body: Body, supports: Sequence[AnySupport] = (), finest: float = 1e-7) -> np.ndarray:

@@ -18,6 +18,7 @@ from fenics_contact._adaptive.marking import bulk
 from fenics_contact._adaptive.quantities import quantity as named
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
 from fenics_contact._adaptive.small_spots import doubted_pairs, refined_at_spots
+from fenics_contact._adaptive.sticking_ends import depends_on_slip, refined_at_sticking_ends
 from fenics_contact._base.checks import check_numbers, checked
 from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.libraries import MPI
@@ -459,14 +460,16 @@ class Way:
             if grown <= growth:
                 break
             share *= (growth - 1.0) / (grown - 1.0)  # meshes need others to be halved, too
-        return self._at_crossings(found)
+        return self._at_points(found)
 
     def _at_spots(self) -> SceneRefinement:
         """Return the next meshes where spots are smaller than their cells."""
         return refined_at_spots(self._state, self._doubted)
 
-    def _at_crossings(self, found: SceneRefinement) -> SceneRefinement:
-        """Return the next meshes with smaller cells where materials cross."""
+    def _at_points(self, found: SceneRefinement) -> SceneRefinement:
+        """Return the next meshes with smaller cells where materials cross and ends of contacts may slip."""
+        if depends_on_slip(self.quantity):
+            found = refined_at_sticking_ends(self._state, found)
         return refined_at_crossings(found)
 
     def _halved(self, marked: Mapping[str, np.ndarray]) -> SceneRefinement:

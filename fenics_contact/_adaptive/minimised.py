@@ -263,7 +263,7 @@ class _Descent(Way):
         others = {} if simplices else {"most": 1}  # all cells of a body are halved
         return refined_at_spots(self._state, self._doubted, scene=scene, refine=refined_for_designs, **others)
 
-    def _at_crossings(self, found: SceneRefinement) -> SceneRefinement:
+    def _at_points(self, found: SceneRefinement) -> SceneRefinement:
         """Return the next meshes as they are: cells of designs keep their sizes relative to each other."""
         return found
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,3 +67,18 @@ def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefineme
         refinements[name] = refined(mesh, np.arange(mesh.n_cells) if halves_together(mesh) else cells)
         bodies[name] = replace(bodies[name], mesh=refinements[name].mesh)
     return SceneRefinement(replace(scene, bodies=bodies), refinements)
+
+
+def refined_again(
+    found: SceneRefinement, marked: Callable[[Scene], Mapping[str, np.ndarray]], halvings: int
+) -> SceneRefinement:
+    """Halve some cells of refined meshes some more times, as long as there are some.
+
+    `marked`: returns the cells of the bodies of a scene to halve; `halvings`: how often at most.
+    """
+    for _ in range(halvings):
+        cells = {name: each for name, each in marked(found.scene).items() if len(each)}
+        if not cells:
+            break
+        found = refine_scene(found.scene, cells).after(found)
+    return found

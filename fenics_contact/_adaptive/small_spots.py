@@ -61,7 +61,7 @@ def refined_at_spots(
                 continue
             wide = spot.half_width / across if again else 0.0
             for name in spot.bodies:
-                cells = spot.near(found.scene.bodies[name].mesh, wide)
+                cells = cells_at(found.scene.bodies[name].mesh, spot.points, wide, spot.half_width)
                 marked[name] = np.union1d(marked.get(name, cells), cells)
         marked = {name: cells for name, cells in marked.items() if len(cells)}
         if not marked:
@@ -98,14 +98,18 @@ class _Spot:
         bodies = tuple(dict.fromkeys(side.body for side in sides))
         return cls(bodies, shown[pressing], _half_width(state, number, places))
 
-    def near(self, mesh: BodyMesh, wide: float) -> np.ndarray:
-        """Return the cells that may reach the spot and are wider than some length."""
-        corners = mesh.points[mesh.cells]
-        middle = corners.mean(axis=1)
-        reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-        away, _ = cKDTree(self.points).query(middle)
-        width = 2.0 * reach / np.sqrt(mesh.dim)  # the edge of squares and cubes
-        return np.flatnonzero((away <= reach + self.half_width) & (width > wide))
+
+def cells_at(mesh: BodyMesh, places: np.ndarray, wide: float, around: float = 0.0) -> np.ndarray:
+    """Return the cells that may reach some places and are wider than some length.
+
+    `places`: shape (n, dim), [length]; `around`: how far from a place they may lie.
+    """
+    corners = mesh.points[mesh.cells]
+    middle = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    away, _ = cKDTree(places).query(middle)
+    width = 2.0 * reach / np.sqrt(mesh.dim)  # the edge of squares and cubes
+    return np.flatnonzero((away <= reach + around) & (width > wide))
 
 
 def _half_width(state: State, number: int, places: np.ndarray) -> float:
