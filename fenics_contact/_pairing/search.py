@@ -7,7 +7,8 @@ that are partly beside the other surface keep that mean, and so do points with s
 
 Dual functions are negative in places. Where a surface turns away from the other one in a crease, so that the
 gap is no smooth function, such a mean may be below all gaps of the nodes in it, and bodies that only touch
-would be pressed apart: there a point has the gap of its node.
+would be pressed apart: there no point has less than the gap of its node. This holds for each point by itself,
+so that gaps are continuous functions of a design.
 """
 
 from __future__ import annotations
@@ -106,12 +107,12 @@ def closable_gaps(
     share: float,
     comm: MPI.Comm,
     alone: np.ndarray,
-    creased: np.ndarray | None = None,
+    creased: np.ndarray,
 ) -> ClosableGaps:
     """Return the gaps that linear displacements can close. Collective.
 
     `comm`: communicator of the ranks that share the work; `alone`: whether a point has no dual function but
-    its own, shape (n,); others keep their mean; `creased`: which are at creases, shape (n,), by default none.
+    its own, shape (n,); others keep their mean; `creased`: which are at creases, shape (n,).
     """
     weight, mine = coupling.weight, coupling.node
     if coupling.own is not None:
@@ -133,25 +134,16 @@ def closable_gaps(
     if master.followed is not None:
         opposite = master.followed @ opposite
     lost = abs(weight) @ np.isnan(opposite).astype(np.float64) > 0
-    met = ~np.isnan(opposite)
     opposite = np.nan_to_num(opposite)
     across = np.where(lost, own, weight @ opposite)
     closable = (1.0 - share) * own + share * across
     kept = np.isnan(closable) | ~alone
     value = np.where(kept, coupling.gap, closable)
-    nodal = np.zeros(len(value), dtype=bool)
-    if creased is not None:
-        at_node, lowest = gaps[coupling.node], _lowest(weight, np.where(met, opposite, np.inf))
-        means = lowest if coupling.own is None else _lowest(coupling.own, np.nan_to_num(gaps, nan=np.inf))
-        nodal = creased & (value < np.minimum(np.minimum(at_node, lowest), means))
-        value, kept = np.where(nodal, at_node, value), kept & ~nodal
+    at_node = gaps[coupling.node]
+    nodal = creased & (value < at_node)
+    value, kept = np.where(nodal, at_node, value), kept & ~nodal
     shares = np.where(lost | kept | nodal, 0.0, share)
     return ClosableGaps(value, kept, shares, here, there, np.nan_to_num(gaps), opposite, nodal)
-
-
-def _lowest(weight: sp.csr_matrix, values: np.ndarray) -> np.ndarray:
-    """Return the lowest value with a weight in each row, shape (n,)."""
-    return np.minimum.reduceat(np.append(values[weight.indices], np.inf), weight.indptr[:-1])
 
 
 def _at_creases(slave: FacetedSurface, master: FacetedSurface, coupling: MortarCoupling) -> np.ndarray:
@@ -275,13 +267,9 @@ class MortarPoints:
         gathering = None if gathering is None else gathering.chosen(chosen)
         flat, closable = slave.relief is None and master.relief is None, None
         alone = np.full(len(chosen), not flat) if gathering is None or flat else ~gathering.gathers
-        if not flat:
-            closable = closable_gaps(slave, master, coupling, share, comm, alone)
-        found = coupling.gap if closable is None else closable.value
-        if np.any(found < -computed_rounding(slave.points)):
-            creased = _at_creases(slave, master, coupling)
-            if creased.any():
-                closable = closable_gaps(slave, master, coupling, share, comm, alone, creased)
+        creased = _at_creases(slave, master, coupling)
+        if not flat or creased.any():
+            closable = closable_gaps(slave, master, coupling, share, comm, alone, creased)
         return cls(slave, master, coupling, gathering, closable)
 
     @property

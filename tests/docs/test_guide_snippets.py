@@ -18,9 +18,6 @@ PAGES = sorted(path.relative_to(ROOT) for path in FILES)
 #: Pages of many seconds, which claims rest on.
 LONG = ("clamp_hub", "large_deformations", "not_converging", "shape_optimisation", "valve_deck")
 MARKS = {page: [pytest.mark.slow, pytest.mark.claim] for page in LONG}
-MARKS["valve_deck"].append(
-    pytest.mark.xfail(reason="with the normals of sharp slave nodes by mortar the optimisation ends early")
-)
 MARKED = [
     pytest.param(page, marks=[*MARKS.get(page.stem, ())], id=page.stem)
     for page in PAGES

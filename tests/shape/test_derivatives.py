@@ -573,6 +573,15 @@ def test_bodies_that_only_touch_do_not_overlap_at_creases(kind: str, master: boo
 
 
 @pytest.mark.parametrize("kind", ["edges", "edges3"])
+def test_gaps_at_creases_are_continuous_while_bodies_part(kind: str) -> None:
+    slave, other = turning_away(kind, True)
+    heights = np.linspace(-0.05, 0.05, 101)
+    gaps = np.array([couple(moved(slave, np.array([0.0, up])), other).gap for up in heights])
+    steps = np.abs(np.diff(gaps, axis=0)) / np.diff(heights)[:, None]
+    assert 0.5 < steps.max() < 2.0
+
+
+@pytest.mark.parametrize("kind", ["edges", "edges3"])
 def test_gaps_at_creases_have_the_derivative_of_those_of_nodes(kind: str) -> None:
     rng = np.random.default_rng(5)
     slave, master = (  # not only touching, where many points are as low as their lowest node
