@@ -37,7 +37,7 @@ from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Sup
 from fenics_contact._scene.thickness import require_thickness
 from fenics_contact._scene.tools import ToolBody, bodies_with_tools, with_motions
 from fenics_contact._scene.touching import check_touching
-from fenics_contact._surfaces.corners import sharp_nodes
+from fenics_contact._surfaces.corners import facing_area, sharp_nodes
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.true_surface import Geometry, true_surface
 from fenics_contact.errors import InvalidInputError
@@ -605,7 +605,9 @@ def slave_of(scene: SceneParts, pair: ContactPair | AnyTie, geometry: Geometry) 
 
 def as_mortar_slave(scene: SceneParts, side: Surface, surface: FacetedSurface) -> FacetedSurface:
     """Return a named surface as the slave of mortar contact: with areas of pieces, and its sharp nodes."""
-    return replace(surface.with_areas_of_pieces(), sharp=sharp_at(scene, side))
+    body = scene.bodies[side.body]
+    enough = facing_area(body.mesh, side.name, body.axisymmetric)
+    return replace(surface.with_areas_of_pieces(), sharp=np.where(sharp_at(scene, side), enough, np.inf))
 
 
 def sharp_at(scene: SceneParts, side: Surface) -> np.ndarray:

@@ -6,7 +6,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fenics_contact._surfaces.facets import faceted_surface
+from fenics_contact._surfaces.facets import faceted_surface, nodal_areas
 from fenics_contact._surfaces.true_surface import is_crease, joints_of
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces
@@ -32,6 +32,20 @@ def sharp_nodes(mesh: BodyMesh, name: str, cuts: np.ndarray) -> np.ndarray:
     if key not in known:
         known[key] = _sharp(mesh.origin, np.unique(mesh.origin.linear.surfaces[name]), cuts)
     return known[key]
+
+
+def facing_area(mesh: BodyMesh, name: str, axisymmetric: bool, share: float = 0.2) -> np.ndarray:
+    """Return the area of each node of a surface, ascending, that is enough to face a master, shape (n,).
+
+    It is that of the mesh before any design moved it.
+
+    `share`: fraction of the node's area on the smallest facet around it.
+    """
+    mesh = mesh.origin
+    facets = linear_facets(mesh.linear.surfaces[name], mesh.dim).rows
+    least = np.full(mesh.n_nodes, np.inf)
+    np.minimum.at(least, facets, nodal_areas(mesh.points, facets, axisymmetric))
+    return share * least[np.unique(facets)]
 
 
 def _sharp(mesh: BodyMesh, nodes: np.ndarray, cuts: np.ndarray) -> np.ndarray:

@@ -376,8 +376,8 @@ class FacetedSurface:
             positive, as of slaves of mortar contact.
         mixed: How these facets, all triangles, are pieces of triangles and quadrilaterals; None where all
             are alike.
-        sharp: Which nodes lie on corners or edges of the body, shape (n,), of slaves of mortar contact; None:
-            none does.
+        sharp: Area that has to face the master for a node on a corner or an edge of the body to have its
+            normal, infinite elsewhere, shape (n,), of slaves of mortar contact; None: infinite everywhere.
     """
 
     nodes: np.ndarray

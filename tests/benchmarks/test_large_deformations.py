@@ -29,7 +29,6 @@ from benchmarks.large_deformations.report import (
 from benchmarks.large_deformations.rounded_meshes import DIES
 from benchmarks.study import filled
 from fenics_contact import clean_environment
-from fenics_contact.errors import ConvergenceError
 from tests.conftest import ROOT
 
 PAGE = ROOT / "docs" / "studies" / "large_deformations.md"
@@ -220,10 +219,6 @@ def test_a_twisted_half_sphere_has_the_published_moments_to_three_percent(record
 
 
 @pytest.mark.claim
-@pytest.mark.xfail(
-    raises=ConvergenceError,
-    reason="with the normals of sharp slave nodes by mortar Newton's method ends at 0.47 of the way",
-)
 def test_a_half_sphere_is_twisted_as_the_record_says(record: dict[str, Any]) -> None:
     coarse, last = record["twisting"][0], 10
     found = twisting.measured(MPI.COMM_SELF, coarse["columns"], last)

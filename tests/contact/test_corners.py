@@ -19,9 +19,11 @@ from fenics_contact import (
     Surface,
     solve_scene,
 )
+from fenics_contact._pairing.mortar.coupling import mortar_coupling
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke, PlaneStrain
 from fenics_contact.results.resolution import CALL, CornerBetweenNodes, CornerKeptAway
+from tests.pairing.mortar_surfaces import lattice
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 
@@ -194,3 +196,19 @@ def test_a_sharp_ring_presses_along_the_axis(strain: str) -> None:
         forces[kind] = contact.normal_force @ contact.points.normal
     assert forces["node"][1] > 10.0
     require_upright(forces["mortar"], float(forces["node"][1]))
+
+
+def test_an_edge_of_which_hardly_a_part_faces_the_master_keeps_its_normal() -> None:
+    """A disc over the end of a level line: its facets that face the line turn by up to 60 degrees."""
+    line = lattice(np.column_stack([np.linspace(0, 1, 11), np.zeros(11)]), "edges", False)
+    line = replace(line, sharp=np.where(line.points[:, 0] == 1.0, 0.01, np.inf))
+    around = np.linspace(-0.5 * np.pi - 1.2, -0.5 * np.pi + 1.2, 25)
+    leaning = []
+    for middle in (0.48, 0.5, 0.6):
+        places = 0.5 * np.column_stack([np.cos(around), np.sin(around)]) + (middle, 0.5)
+        coupling = mortar_coupling(line, lattice(places, "edges", True))
+        assert coupling.node[-1] == 10
+        leaning.append(np.degrees(np.arccos(-coupling.normal[-1, 1])))
+    assert leaning[0] < 1e-3
+    assert 1.0 < leaning[1] < leaning[2]
+    assert leaning[2] == pytest.approx(53.0, abs=2.0), "as the disc over the end of the line"

@@ -59,15 +59,20 @@ def shells(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
 
 
 def sharp_plates(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
-    """The plates, with the master's normals at each second node of the slave."""
+    """The plates, with the master's normals at a third of its nodes, and a part of them at another."""
     slave, master = plates(kinds)
-    return replace(slave, sharp=np.arange(len(slave.nodes)) % 2 == 0), master
+    return sharpened(slave), master
 
 
 def sharp_shells(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
     """The shells, likewise."""
     slave, master = shells(kinds)
-    return replace(slave, sharp=np.arange(len(slave.nodes)) % 2 == 0), master
+    return sharpened(slave), master
+
+
+def sharpened(slave: FacetedSurface) -> FacetedSurface:
+    third = np.arange(len(slave.nodes)) % 3
+    return replace(slave, sharp=np.choose(third, [0.5 * slave.areas, 2.0 * slave.areas, np.inf]))
 
 
 def matching(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:

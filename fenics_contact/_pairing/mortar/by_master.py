@@ -30,9 +30,9 @@ def with_inclined(
     cosine = -np.einsum("nd,nd->n", other, slave.normals[node])
     inclined = cosine < np.cos(np.radians(INCLINED)) * np.linalg.norm(other, axis=1)
     sharp = slave.sharp.copy()
-    sharp[node[inclined]] = True
+    sharp[node[inclined]] = coupling.area[inclined]
     slave = replace(slave, sharp=sharp)
-    normal = normals_at(slave, master, node, weight)
+    normal = normals_at(slave, master, node, weight, coupling.area)
     apart = coupling.of_slave(slave.points) - weight @ master.points + coupling.relief
     return slave, replace(coupling, normal=normal, gap=np.einsum("nd,nd->n", normal, apart))
 
@@ -44,30 +44,35 @@ class NormalsPulledBack:
     Attributes:
         slave: By the slave's normal at each point, shape (n, dim).
         master: By the normals of the master's nodes, shape (len(master.nodes), dim).
-        summed: By N, zero where the slave's normals count, shape (n, dim).
+        summed: By Σ_j W_j m_j, zero where the slave's normals count, shape (n, dim).
+        area: By the areas of the points that face the master, shape (n,).
     """
 
     slave: np.ndarray
     master: np.ndarray
     summed: np.ndarray
+    area: np.ndarray
 
     @classmethod
     def of(
         cls, slave: FacetedSurface, master: FacetedSurface, coupling: MortarCoupling, by: CouplingDerivatives
     ) -> NormalsPulledBack:
         """Differentiate through the normals themselves, and through the gaps along them."""
+        node = coupling.node
         apart = coupling.of_slave(slave.points) - coupling.weight @ master.points + coupling.relief
         by_normal = by.normal + by.gap[:, None] * apart
-        chosen = MasterNormals.of(slave, master, coupling.node, coupling.weight)
-        by_slave, by_summed = -by_normal, np.zeros_like(by_normal)
-        by_slave[chosen.point] = 0.0
-        by_summed[chosen.point] = chosen.across(slave, coupling.node, by_normal[chosen.point])
-        return cls(by_slave, coupling.weight.T @ by_summed, by_summed)
+        chosen = MasterNormals.of(slave, master, node, coupling.weight, coupling.area)
+        by_slave, by_summed, by_area = -by_normal, np.zeros_like(by_normal), np.zeros(len(node))
+        by_all, part = chosen.across(by_normal[chosen.point]), chosen.part[:, None]
+        by_slave[chosen.point] = (part - 1.0) * by_all
+        by_summed[chosen.point] = slave.within(part * by_all, slave.mirrored[node[chosen.point]])
+        by_area[chosen.point] = np.einsum("nd,nd->n", chosen.by_area, by_all)
+        return cls(by_slave, coupling.weight.T @ by_summed, by_summed, by_area)
 
     def with_weights(self, by: CouplingDerivatives, master: FacetedSurface) -> CouplingDerivatives:
-        """Return derivatives by a coupling with those by the weights in N; gaps count along fixed normals."""
+        """Return derivatives by a coupling with those of N by weights and areas; gaps have fixed normals."""
         if not self.summed.any():
             return by
         own = None if by.own is None else np.hstack([by.own, np.zeros((len(by.own), master.dim))])
         left, right = np.hstack([by.left, self.summed]), np.hstack([by.right, master.normals])
-        return replace(by, left=left, right=right, own=own)
+        return replace(by, area=by.area + self.area, left=left, right=right, own=own)

@@ -343,7 +343,7 @@ def _coupling(
     """
     node = np.flatnonzero(area > least_share * slave.areas)
     weight, own = _scaled(integrals[node]), None if slave.whole is None else _scaled(means[node])
-    normal = normals_at(slave, master, node, weight)
+    normal = normals_at(slave, master, node, weight, area[node])
     raised = relief[node] / area[node, None]
     coupling = MortarCoupling(node, area[node], weight, normal, raised, np.zeros(len(node)), own)
     apart = coupling.of_slave(slave.points) - weight @ master.points + raised

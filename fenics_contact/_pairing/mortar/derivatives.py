@@ -454,11 +454,14 @@ class WeightDerivatives:
         node: Its node of the master, or, after these, of the slave in its mean, shape (m,).
         rows: Derivatives by the nodes of the slave and, after them, of the master, shape (m, dim · (n_slave +
             n_master)), [1 / length].
+        area: Derivatives of the areas of all points, likewise, shape (n, dim · (n_slave + n_master)), zero of
+            those that were not wanted.
     """
 
     point: np.ndarray
     node: np.ndarray
     rows: sp.csr_matrix
+    area: sp.csr_matrix
 
 
 def weight_derivatives(
@@ -490,16 +493,19 @@ def weight_derivatives(
     point, other, count = np.searchsorted(coupling.node, node[kept]), other[kept], len(coupling.node)
     # Weights of the master and of the slave have sums of their own.
     sums = point + count * (other >= len(master.nodes))
-    return WeightDerivatives(point, other, _normalised(sums, integral[kept], rows[kept], 2 * count))
+    weights, by_area = _normalised(sums, integral[kept], rows[kept], 2 * count)
+    return WeightDerivatives(point, other, weights, by_area[:count])
 
 
-def _normalised(point: np.ndarray, integral: np.ndarray, rows: sp.csr_matrix, count: int) -> sp.csr_matrix:
-    """Return the derivative of M_ij / Σ_j M_ij."""
+def _normalised(
+    point: np.ndarray, integral: np.ndarray, rows: sp.csr_matrix, count: int
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Return the derivatives of M_ij / Σ_j M_ij and of Σ_j M_ij."""
     entries = np.ones(len(point)), (point, np.arange(len(point)))
     over = sp.csr_matrix(entries, shape=(count, len(point)))
-    area = (over @ integral)[point]
-    share = scaled_rows((over @ rows)[point], integral / area)
-    return scaled_rows((rows - share).tocsr(), 1.0 / area)
+    area, by_area = (over @ integral)[point], (over @ rows).tocsr()
+    share = scaled_rows(by_area[point], integral / area)
+    return scaled_rows((rows - share).tocsr(), 1.0 / area), by_area
 
 
 def _joined(

@@ -90,9 +90,10 @@ class Gathering:
         node = whole.node[self.point]
         weight, relief = (self.own @ whole.weight).tocsr(), self.own @ whole.relief
         weight.sort_indices()
-        normal, own = normals_at(slave, master, node, weight), self._own_means(len(slave.nodes))
+        area, own = self.part @ whole.area, self._own_means(len(slave.nodes))
+        normal = normals_at(slave, master, node, weight, area)
         gap = np.einsum("nd,nd->n", normal, own @ slave.points - weight @ master.points + relief)
-        return MortarCoupling(node, self.part @ whole.area, weight, normal, relief, gap, own)
+        return MortarCoupling(node, area, weight, normal, relief, gap, own)
 
     def _own_means(self, n_nodes: int) -> sp.csr_matrix:
         """Return the weights of the slave's nodes in its means, shape (n, n_nodes)."""

@@ -295,34 +295,40 @@ class MovingMeans:
         `weights`: derivatives of the weights of all points where v counts.
         """
         slave, master, node = self.slave, self.master, self.coupling.node
-        of_master = MasterNormals.of(slave, master, node, self.coupling.weight)
-        size = np.linalg.norm(summed_normals(slave, slave.points)[node], axis=1)[:, None]
-        vectors = -slave.within(along, slave.mirrored[node]) / size
-        vectors[of_master.point] = 0.0
+        of_master = MasterNormals.of(slave, master, node, self.coupling.weight, self.coupling.area)
+        chosen, size = of_master.point, np.linalg.norm(summed_normals(slave, slave.points)[node], axis=1)
+        by_all = of_master.across(along[chosen])
+        vectors, normal = -along, slave.normals[node[chosen]]
+        level = by_all - np.einsum("nd,nd->n", by_all, normal)[:, None] * normal
+        vectors[chosen] = (of_master.part - 1.0)[:, None] * level
+        vectors = slave.within(vectors, slave.mirrored[node]) / size[:, None]
         everywhere = np.zeros_like(slave.points)
         everywhere[node] = vectors
         own = summed_normals_by_points(slave, everywhere)[node]
         rows = sp.csr_matrix((own.data, own.indices, own.indptr), shape=(len(node), weights.rows.shape[1]))
         if not len(of_master.point):
             return rows
-        turned = self._turned_by_master(of_master, along[of_master.point], weights)
+        turned = self._turned_by_master(of_master, by_all, weights)
         return (rows + placed(of_master.point, len(node)) @ turned).tocsr()
 
     def _turned_by_master(
-        self, chosen: MasterNormals, along: np.ndarray, weights: WeightDerivatives
+        self, chosen: MasterNormals, by_all: np.ndarray, weights: WeightDerivatives
     ) -> sp.csr_matrix:
-        """Return v·δn of the points that have normals of the master, by the nodes of both, (m, n_dofs).
+        """Return v·δN at fixed normals of the slave, by the nodes of both, (m, n_dofs), for vectors v.
 
-        With n = N / ‖N‖ that is v·Σ (δW_j m_j + W_j δm_j) / ‖N‖, and m_j = S_j / ‖S_j‖ of summed areas S_j.
+        That is v·(β Σ (δW_j m_j + W_j δm_j) + N' δD), and m_j = S_j / ‖S_j‖ of summed areas S_j.
         """
         master, (count, size) = self.master, (len(chosen.point), weights.rows.shape[1])
-        along = chosen.across(self.slave, self.coupling.node, along)
+        mirrored = self.slave.mirrored[self.coupling.node[chosen.point]]
+        along = self.slave.within(chosen.part[:, None] * by_all, mirrored)
         place = np.full(len(self.coupling.node), -1)
         place[chosen.point] = np.arange(count)
         mine = np.flatnonzero((place[weights.point] >= 0) & (weights.node < len(master.nodes)))
         row, node = place[weights.point[mine]], weights.node[mine]
         lever = np.einsum("md,md->m", along[row], master.normals[node])
         result = sp.csr_matrix((lever, (row, mine)), shape=(count, weights.rows.shape[0])) @ weights.rows
+        by_area = np.einsum("nd,nd->n", by_all, chosen.by_area)
+        result = result + scaled_rows(weights.area[chosen.point], by_area)
         weight = self.coupling.weight[chosen.point]
         used = np.zeros(len(master.nodes), dtype=bool)
         used[weight.indices] = True
