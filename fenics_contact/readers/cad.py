@@ -21,13 +21,14 @@ from fenics_contact._base.checks import (
     unit_vector,
 )
 from fenics_contact._base.display import displayed
+from fenics_contact._base.progress import Task
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.readers.bodies import Label
 from fenics_contact.readers.cad_shapes import shape_seen
 from fenics_contact.readers.gmsh import Bodies, from_gmsh_model
-from fenics_contact.readers.gmsh_session import gmsh_model, physical_groups
+from fenics_contact.readers.gmsh_session import import_gmsh, lasting_session, physical_groups, reading_process
 from fenics_contact.shapes.simple import Circle, Cylinder, Plane, Sphere, SurfaceShape, Torus
 
 if TYPE_CHECKING:
@@ -356,20 +357,47 @@ def _read(
     options["Mesh.HighOrderOptimize"] = 1  # only where curved cells would be inverted
     if size is not None:
         options["Mesh.MeshSizeMax"] = max([size, *sizes.values()])
-    with gmsh_model("fenics_contact CAD", **options) as gmsh:
-        with _reasons(path):
-            gmsh.merge(str(path))
-        dim = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
-        _name(gmsh, dim, unique=True)
-        _name(gmsh, dim - 1, unique=False, without=_inner_faces(gmsh, dim, bodies))
-        if surfaces is not None and dim > 1:
-            _choose(gmsh, dim - 1, surfaces, f"file '{path}'")
+    source = f"file '{path}'"
+    with Task("mesh"), reading_process(path) as process:
+        dim = process.call(_opened, path, options, bodies)
+        if surfaces is not None and dim > 1:  # functions that choose are the caller's
+            chosen = chosen_faces(*process.call(_choices, dim - 1), surfaces, source)
+            process.call(_choose, dim - 1, chosen)
         if sizes:
-            _set_sizes(gmsh, dim, size, sizes, bodies, f"file '{path}'")
-        _require_joined(gmsh, dim, bodies, path)
-        with _reasons(path):
-            gmsh.model.mesh.generate(dim)
-        return from_gmsh_model(bodies)
+            process.call(_set_sizes, dim, size, sizes, bodies, source)
+        return process.call(_meshed, dim, path, bodies)
+
+
+def _opened(path: Path, options: Mapping[str, float], bodies: Bodies | None) -> int:
+    """Read the geometry, name what has no name, and return its dimension."""
+    gmsh = lasting_session(path.name, options)
+    with _reasons(path):
+        gmsh.merge(str(path))
+    dim = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
+    _name(gmsh, dim, unique=True)
+    _name(gmsh, dim - 1, unique=False, without=_inner_faces(gmsh, dim, bodies))
+    return dim
+
+
+def _choices(dim: int) -> tuple[list[CadFace], dict[Label, list[int]]]:
+    """Return the faces of the geometry and their groups."""
+    gmsh = import_gmsh()
+    return faces_of(gmsh, dim), physical_groups(gmsh, dim)
+
+
+def _choose(dim: int, chosen: Mapping[str, Sequence[int]]) -> None:
+    """Replace the physical groups of faces by those that are chosen."""
+    gmsh = import_gmsh()
+    gmsh.model.removePhysicalGroups([(dim, tag) for _, tag in gmsh.model.getPhysicalGroups(dim)])
+    _add_groups(gmsh, dim, chosen)
+
+
+def _meshed(dim: int, path: Path, bodies: Bodies | None) -> dict[str, BodyMesh]:
+    gmsh = import_gmsh()
+    _require_joined(gmsh, dim, bodies, path)
+    with _reasons(path):
+        gmsh.model.mesh.generate(dim)
+    return from_gmsh_model(bodies)
 
 
 def _require_joined(gmsh: ModuleType, dim: int, bodies: Bodies | None, path: Path) -> None:
@@ -418,7 +446,6 @@ def _labels_of(bodies: Bodies | None) -> dict[str, list[str]]:
 
 
 def _set_sizes(
-    gmsh: ModuleType,
     dim: int,
     size: float | None,
     sizes: Mapping[str, float],
@@ -426,7 +453,7 @@ def _set_sizes(
     source: str,
 ) -> None:
     """Give the points of bodies and surfaces their sizes, from the largest to the smallest."""
-    known: dict[str, list[tuple[int, int]]] = {}
+    gmsh, known = import_gmsh(), dict[str, list[tuple[int, int]]]()
     for of in (dim, dim - 1):
         for label, tags in physical_groups(gmsh, of).items() if of else ():
             known.setdefault(str(label), []).extend((of, tag) for tag in tags)
@@ -466,14 +493,6 @@ def _name(gmsh: ModuleType, dim: int, *, unique: bool, without: Collection[int] 
     for tag, name in names.items():
         groups.setdefault(f"{name} {tag}" if unique and times[name] > 1 else name, []).append(tag)
     _add_groups(gmsh, dim, groups)
-
-
-def _choose(gmsh: ModuleType, dim: int, surfaces: FaceChoice, source: str) -> None:
-    """Replace the physical groups of faces by those that are chosen."""
-    groups = physical_groups(gmsh, dim)
-    chosen = chosen_faces(faces_of(gmsh, dim), groups, surfaces, source)
-    gmsh.model.removePhysicalGroups([(dim, tag) for _, tag in gmsh.model.getPhysicalGroups(dim)])
-    _add_groups(gmsh, dim, chosen)
 
 
 def _add_groups(gmsh: ModuleType, dim: int, groups: Mapping[str, Sequence[int]]) -> None:

@@ -15,13 +15,20 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._base.checks import naming_arguments, require_file
+from fenics_contact._base.progress import Task
 from fenics_contact.errors import FenicsContactError, InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.readers.bodies import TaggedMesh, bodies_of
 from fenics_contact.readers.cad_shapes import cad_shapes
-from fenics_contact.readers.gmsh_session import gmsh_model, running_gmsh, tagged_mesh_of
+from fenics_contact.readers.gmsh_session import (
+    gmsh_model,
+    lasting_session,
+    reading_process,
+    running_gmsh,
+    tagged_mesh_of,
+)
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -122,14 +129,19 @@ def _read(path: Path) -> TaggedMesh:
             f"file '{path}' must be a .msh file, which starts with $MeshFormat, it starts with {start!r}: "
             "let gmsh write it (gmsh.write, or `gmsh -3 part.geo -o part.msh`)"
         )
-    with gmsh_model("fenics_contact import") as gmsh:
-        try:
-            gmsh.merge(str(path))
-        except Exception as reason:  # gmsh raises no other class
-            raise InvalidInputError(
-                f"file '{path}' must be a .msh file that gmsh can read, it says: {reason}: write it again"
-            ) from reason
-        return tagged_mesh_of(gmsh, f"file '{path}'")
+    with Task("mesh"), reading_process(path) as process:
+        return process.call(_merged, path)
+
+
+def _merged(path: Path) -> TaggedMesh:
+    gmsh = lasting_session(path.name, {})
+    try:
+        gmsh.merge(str(path))
+    except Exception as reason:  # gmsh raises no other class
+        raise InvalidInputError(
+            f"file '{path}' must be a .msh file that gmsh can read, it says: {reason}: write it again"
+        ) from reason
+    return tagged_mesh_of(gmsh, f"file '{path}'")
 
 
 @naming_arguments

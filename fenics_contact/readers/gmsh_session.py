@@ -11,11 +11,13 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from fenics_contact._base.apart import OwnProcess
 from fenics_contact._base.progress import Task
 from fenics_contact._base.requirements import check_gmsh
 from fenics_contact.errors import InvalidInputError
@@ -178,6 +180,28 @@ _OPTIONS = {
 """Options on which the meshes of this package rely: gmsh's defaults, without output."""
 
 
+def reading_process(path: Path) -> OwnProcess:
+    """Return a process in which gmsh reads a file: it and OpenCASCADE crash at files that mislead them.
+
+    It knows nothing of the caller's gmsh, whose models and options count for no file.
+    """
+    return OwnProcess(
+        f"gmsh's reading of file '{path}'",
+        "the file is damaged or holds what gmsh cannot handle: write it again, look at it with gmsh, or, if "
+        "it is sound, take a machine with more memory",
+    )
+
+
+def lasting_session(name: str, options: Mapping[str, float]) -> ModuleType:
+    """Start gmsh with an empty model until the process ends, which is a `reading_process`."""
+    gmsh = import_gmsh()
+    _initialise(gmsh)
+    for option, value in {**_OPTIONS, **options}.items():
+        gmsh.option.setNumber(option, value)
+    gmsh.model.add(name)
+    return gmsh
+
+
 @contextmanager
 def gmsh_model(name: str, **more: float) -> Iterator[ModuleType]:
     """Open an empty gmsh model and remove it afterwards.
@@ -196,7 +220,7 @@ def gmsh_model(name: str, **more: float) -> Iterator[ModuleType]:
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
     """
     with Task("mesh"), interrupt_handler_kept():
-        gmsh = _import_gmsh()
+        gmsh = import_gmsh()
         foreign = _is_initialised(gmsh)
         if not foreign:
             _initialise(gmsh)
@@ -223,7 +247,7 @@ def gmsh_model(name: str, **more: float) -> Iterator[ModuleType]:
 def running_gmsh() -> ModuleType | None:
     """Return the module ``gmsh`` if it is initialised, else None."""
     with interrupt_handler_kept():
-        gmsh = _import_gmsh()
+        gmsh = import_gmsh()
         return gmsh if _is_initialised(gmsh) else None
 
 
@@ -232,7 +256,8 @@ def _initialise(gmsh: ModuleType) -> None:
     gmsh.initialize(readConfigFiles=False, **({"interruptible": False} if "interruptible" in known else {}))
 
 
-def _import_gmsh() -> ModuleType:
+def import_gmsh() -> ModuleType:
+    """Return the module ``gmsh``, checked."""
     check_gmsh()
     return importlib.import_module("gmsh")
 

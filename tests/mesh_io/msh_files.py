@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
 CUBE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
 TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON, PRISM, PYRAMID = 2, 3, 4, 5, 6, 7
 TRIANGLE_10, QUADRILATERAL_8 = 21, 16
@@ -26,6 +28,13 @@ def own_gmsh() -> Iterator[ModuleType]:
     yield gmsh
     gmsh.finalize()
     signal.signal(signal.SIGINT, handler)
+
+
+def changed_gmsh(folder: Path, statement: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let processes that are started from now on import a gmsh after which a statement runs."""
+    lines = ["import sys", f"sys.path.remove({str(folder)!r})", "del sys.modules['gmsh']", "import gmsh"]
+    (folder / "gmsh.py").write_text("\n".join([*lines, statement, ""]))
+    monkeypatch.syspath_prepend(str(folder))
 
 
 def name(gmsh: ModuleType, dim: int, tags: Sequence[int], text: str) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
 
-from fenics_contact import read_mesh
+from fenics_contact import read_cad, read_mesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.readers import from_meshio, read_msh
 from tests.mesh_io.mesh_files import joined, with_tags
@@ -21,6 +23,7 @@ from tests.mesh_io.msh_files import (
     TETRAHEDRON,
     TRIANGLE,
     TRIANGLE_10,
+    changed_gmsh,
     write_22,
 )
 
@@ -51,6 +54,40 @@ def test_a_broken_file_is_answered_with_what_gmsh_says(tmp_path: Path) -> None:
         InvalidInputError, match=r"gmsh can read, it says: Could not read entities: write it again"
     ):
         read_msh(broken)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_file_that_crashes_gmsh_is_refused_on_all_ranks(
+    ranks: int, tmp_path: Path, mpirun: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_22(tmp_path / "f.msh", CUBE, [(TETRAHEDRON, 1, (0, 1, 2, 4))], {(3, 1): "lug"})
+    changed_gmsh(tmp_path, "import os; gmsh.merge = lambda _: os.kill(os.getpid(), 11)", monkeypatch)
+    script = f"""
+        import sys
+        from mpi4py import MPI
+        from fenics_contact.errors import InvalidInputError
+        from fenics_contact.readers import read_msh
+
+        sys.path.insert(0, {str(tmp_path)!r})
+        try:
+            read_msh({str(path)!r}, comm=MPI.COMM_WORLD)
+        except InvalidInputError as error:
+            sys.stdout.write(str(error) + chr(10))
+    """
+    answers = mpirun(script, ranks).splitlines()
+    assert len(answers) == ranks
+    words = r"gmsh's reading of file '.*f\.msh' must come to an end, but the process crashed \(signal 11,"
+    assert all(re.match(words, answer) for answer in answers)
+
+
+def test_a_drawing_that_crashes_the_mesher_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "box.geo"
+    path.write_text('SetFactory("OpenCASCADE");\nBox(1) = {0, 0, 0, 1, 1, 1};\n')
+    changed_gmsh(tmp_path, "import os; gmsh.model.mesh.generate = lambda _: os.abort()", monkeypatch)
+    with pytest.raises(InvalidInputError, match=r"box\.geo' must .* crashed \(signal 6, .*write it again"):
+        read_cad(path, 1.0)
 
 
 def test_a_file_without_cells_is_refused(tmp_path: Path) -> None:

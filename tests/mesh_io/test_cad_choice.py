@@ -15,6 +15,7 @@ from fenics_contact import BodyMesh, read_cad
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.readers import CadFace, InBox, OnCylinder, OnPlane, gmsh_model
 from fenics_contact.shapes import Cylinder, Plane
+from tests.mesh_io.msh_files import changed_gmsh
 
 WIDE, HIGH, RADIUS = 4.0, 1.0, 0.6
 
@@ -130,14 +131,12 @@ def test_directions_must_be_directions() -> None:
         OnCylinder("wide")  # type: ignore[arg-type]
 
 
-def test_names_that_gmsh_passes_on_choose_faces(plate: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_names_that_gmsh_passes_on_choose_faces(
+    plate: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """gmsh 4.8 reads the names of bodies only, newer ones those of faces too."""
-    with gmsh_model("names") as gmsh:
-        monkeypatch.setattr(
-            gmsh.model,
-            "getEntityName",
-            lambda dim, tag: f"Shapes/solid/{'wall' if dim == 2 and tag < 3 else ''}",
-        )
+    names = "lambda dim, tag: f\"Shapes/solid/{'wall' if dim == 2 and tag < 3 else ''}\""
+    changed_gmsh(tmp_path, f"gmsh.model.getEntityName = {names}", monkeypatch)
     mesh = read(plate, wall="wall")
     np.testing.assert_array_equal(mesh.surfaces["wall"], read(plate, other=[1, 2]).surfaces["other"])
     with pytest.raises(

@@ -6,8 +6,6 @@ import contextlib
 import io
 import random
 import signal
-import subprocess
-import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -17,9 +15,8 @@ from pathlib import Path
 from mpi4py import MPI
 
 from fenics_contact import _cli as cli
-from fenics_contact._base.launching import clean_environment
 from tests.mutated.spoiling import spoilt_bytes, spoilt_text
-from tests.mutated.subjects import APART, SUBJECTS
+from tests.mutated.subjects import SUBJECTS
 
 #: Commands end with 0, or with the code of input that cannot be used, with one line that says why.
 EXPECTED = (0, int(cli.ExitCode.WRONG_INPUT))
@@ -61,7 +58,7 @@ def _limit(seconds: int) -> Iterator[None]:
 def run(subject: str, path: Path, seed: int = -1, limit: int = 60) -> Verdict:
     """Plan a file by the command line."""
     start = time.perf_counter()
-    code, trouble, words = (_run_apart if subject in APART else _run_here)(path, limit)
+    code, trouble, words = _planned(path, limit)
     if not trouble and ("Traceback" in words or "TimeoutError" in words):
         trouble = words.strip().splitlines()[-1]
     if not trouble and code not in EXPECTED:
@@ -69,7 +66,7 @@ def run(subject: str, path: Path, seed: int = -1, limit: int = 60) -> Verdict:
     return Verdict(subject, seed, code, trouble, words.strip(), time.perf_counter() - start)
 
 
-def _run_here(path: Path, limit: int) -> tuple[int, str, str]:
+def _planned(path: Path, limit: int) -> tuple[int, str, str]:
     """Plan a file in this process, where warnings are errors."""
     out, err, code, trouble = io.StringIO(), io.StringIO(), -1, ""
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
@@ -80,19 +77,6 @@ def _run_here(path: Path, limit: int) -> tuple[int, str, str]:
         except BaseException as error:  # whatever comes through is what is looked for
             trouble = f"{type(error).__name__}: {error}"
     return code, trouble, err.getvalue()
-
-
-def _run_apart(path: Path, limit: int) -> tuple[int, str, str]:
-    """Plan a file in a process of its own, which libraries in C++ may end."""
-    command = [sys.executable, "-m", "fenics_contact", "run", str(path), "--plan"]
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=limit, check=False, env=clean_environment()
-        )
-    except subprocess.TimeoutExpired:
-        return -1, f"not done in {limit} s", ""
-    trouble = f"ended by signal {-done.returncode}" if done.returncode < 0 else ""
-    return done.returncode, trouble, done.stderr
 
 
 def judged(subject: str, seed: int, folder: Path) -> Verdict:

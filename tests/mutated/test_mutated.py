@@ -10,17 +10,17 @@ from pathlib import Path
 import pytest
 
 from tests.mutated.judging import judged, run
-from tests.mutated.subjects import APART, SUBJECTS
+from tests.mutated.subjects import SUBJECTS
 
 
-@pytest.mark.parametrize("subject", [name for name in SUBJECTS if name not in APART])
+@pytest.mark.parametrize("subject", SUBJECTS)
 def test_files_without_a_mistake_are_planned(subject: str, tmp_path: Path) -> None:
     path, _ = SUBJECTS[subject](tmp_path)
     verdict = run(subject, path)
     assert (verdict.code, verdict.trouble) == (0, ""), verdict.words
 
 
-@pytest.mark.parametrize("subject", [name for name in SUBJECTS if name not in APART])
+@pytest.mark.parametrize("subject", SUBJECTS)
 def test_files_with_mistakes_end_in_words(subject: str, tmp_path: Path) -> None:
     verdicts = [judged(subject, seed, tmp_path) for seed in range(4)]
     assert not [f"{each.seed}: {each.trouble}" for each in verdicts if each.trouble]
