@@ -290,8 +290,9 @@ def test_patch_of_half_the_height(cells: str, held: bool, friction: float) -> No
 @pytest.mark.parametrize(
     ("cells", "held", "friction"), [("triangle", False, 0.3), ("quadrilateral", True, 0.0)]
 )
-def test_patch_of_quadratic_cells_of_half_the_height(cells: str, held: bool, friction: float) -> None:
-    scene = stacked(cells, 1.0, held=held, friction=friction)
+def test_patch_of_pressed_quadratic_cells(cells: str, held: bool, friction: float) -> None:
+    """Free sides wrinkle at about 46 % (Biot): beyond, the homogeneous state is one of several."""
+    scene = stacked(cells, 0.8, held=held, friction=friction)
     bodies = {name: replace(body, mesh=quadratic(body.mesh)) for name, body in scene.bodies.items()}
     (state,) = followed([replace(scene, bodies=bodies)], MPI.COMM_SELF)
     worst = [line.residuals.worst for line in state.solution.history]
