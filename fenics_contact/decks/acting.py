@@ -33,6 +33,7 @@ from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.readers.deck_bodies import (
     Component,
 )
+from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import Faces
 
 
@@ -117,11 +118,27 @@ class Acting:
                         f"{self.model.mesh.numbers[turned[0]]} has one: load a surface by a node, with "
                         "*COUPLING"
                     )
+                self._check_plane(step.card, moment.forces)
                 loose = inside & ~np.isin(np.arange(len(inside)), self.model.references)
                 force = np.where(loose[:, None], moment.forces, 0.0)[:, : self.model.dim]
                 nodes = np.flatnonzero(force.any(axis=1))
                 result[id(moment)] = self._groups(nodes, force) if len(nodes) else []
         return result
+
+    def _check_plane(self, card: Card, forces: np.ndarray) -> None:
+        """Reject forces and moments out of the plane on plane bodies and on nodes that drive them."""
+        if self.model.dim == 3:
+            return
+        drives = np.isin(np.arange(len(forces)), self.model.references)
+        wrong = abs(forces[:, 2]) > 1e-9 * np.linalg.norm(forces[:, :3], axis=1)
+        wrong &= drives | self.model.nodes_of_bodies()
+        wrong |= drives & forces[:, 3:5].any(axis=1)
+        if wrong.any():
+            raise card.error(
+                "plane elements take forces along x and y and moments about z, node "
+                f"{self.model.mesh.numbers[np.flatnonzero(wrong)[0]]} has others by *CLOAD: correct their "
+                "components, or the axes of *TRANSFORM"
+            )
 
     def _groups(
         self, nodes: np.ndarray, force: np.ndarray, most: int = 6

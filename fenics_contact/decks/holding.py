@@ -17,6 +17,7 @@ from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Rolle
 from fenics_contact.decks.couplings import (
     Bolt,
     Driven,
+    Equation,
     by_node,
     rigid_surface,
 )
@@ -329,6 +330,7 @@ class Holding:
                     f"component {int(np.array(each.components)[turned & inside[at]][0]) + 1} of a node of "
                     f"elements is no displacement: components 1 to {self.model.dim} are", each.row,
                 )  # fmt: skip
+            self._check_plane_terms(each)
             if not inside[at].any():
                 raise each.card.error("needs a node of an element, this equation has none: add one", each.row)
             for node, component in zip(at[~inside[at]], np.array(each.components)[~inside[at]], strict=True):
@@ -340,6 +342,16 @@ class Holding:
                     )  # fmt: skip
             if len(set(each.nodes)) == 1:
                 self.model.node_sets[f"NODE {self.model.mesh.numbers[at[0]]}"] = at[:1]
+
+    def _check_plane_terms(self, equation: Equation) -> None:
+        """Reject terms of nodes of plane elements along axes out of the plane."""
+        turned = self.model.local_axes.keys() & set(equation.nodes) if self.model.dim == 2 else set()
+        for node, k in zip(equation.nodes, equation.components, strict=True):
+            if node in turned and abs(self.model.local_axes[node][k % 3, 2]) > 1e-9 and k < 2:
+                raise equation.card.error(
+                    f"component {k + 1} of node {self.model.mesh.numbers[node]} of plane elements is along "
+                    "an axis of *TRANSFORM out of the plane: give axes 1 and 2 in it", equation.row,
+                )  # fmt: skip
 
     def equations(self) -> tuple[list[Roller], list[LinearConstraint]]:
         """Return the equations: nodes that slide along planes, and relations of several nodes."""

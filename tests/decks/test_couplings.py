@@ -148,6 +148,36 @@ def test_axes_that_turn_the_plane_over_and_nodes_that_are_held_wholly_are_read(
     np.testing.assert_allclose(moved[x == 0.0, 0], 0.0, atol=1e-14)
 
 
+OBLIQUE = "*TRANSFORM, NSET=BAR_X1, TYPE=R\n1., 0., 0., 0., 1., 1.\n"
+DRIVEN = "*NODE\n90, 2., 0.5, 0.\n*RIGID BODY, NSET=BAR_X1, REF NODE=90\n"
+
+
+@pytest.mark.parametrize(
+    ("before", "load", "node"),
+    [("", "5, 3, 2.", 5), (OBLIQUE, "6, 2, 2.", 6), (DRIVEN, "90, 3, 2.", 90), (DRIVEN, "90, 5, 2.", 90)],
+)
+def test_plane_elements_take_no_forces_out_of_the_plane(
+    before: str, load: str, node: int, tmp_path: Path
+) -> None:
+    plate = mesh_cards({"BAR": rectangle((0, 0), (2, 1), (2, 1))}, "CPE4") + STEEL + SECTION
+    held = plate + before + "*BOUNDARY\nBAR_X0, 1, 2\n"
+    message = rf"\*STEP.* along x and y and moments about z, node {node} has others by \*CLOAD"
+    with pytest.raises(DeckError, match=message):
+        read_deck(deck(tmp_path, held + step(f"*CLOAD\n{load}\n")))
+    allowed = "*CLOAD\n5, 1, 2.\n5, 3, 0.\n" + "90, 6, 1.\n" * (before == DRIVEN)
+    assert read_deck(deck(tmp_path, held + step(allowed))).steps
+
+
+@pytest.mark.parametrize("terms", ["1\n6, 2, 1.", "2\n3, 1, 1., 5, 2, -1."])
+def test_equations_of_plane_elements_are_along_axes_in_the_plane(terms: str, tmp_path: Path) -> None:
+    plate = mesh_cards({"BAR": rectangle((0, 0), (2, 1), (2, 1))}, "CPE4") + STEEL + SECTION
+    held = plate + OBLIQUE + "*BOUNDARY\nBAR_X0, 1, 2\n"
+    with pytest.raises(DeckError, match=r"component 2 of node \d of plane elements is along an axis of"):
+        read_deck(deck(tmp_path, held + f"*EQUATION\n{terms}\n" + step("*CLOAD\n5, 1, 2.\n")))
+    in_plane = f"*EQUATION\n{terms}\n".replace(", 2, ", ", 1, ")
+    assert read_deck(deck(tmp_path, held + in_plane + step("*CLOAD\n5, 1, 2.\n"))).steps
+
+
 def test_equations_let_nodes_slide_and_move_alike(tmp_path: Path) -> None:
     slide = "*EQUATION\n2\n17, 1, 1., 17, 2, 1.\n2\n18, 3, 1., 20, 3, -1.\n"
     found = read_deck(deck(tmp_path, BAR + FIXED + slide + step("*CLOAD\n17, 2, 5.\n20, 3, -4.\n")))
