@@ -10,10 +10,11 @@ from fenics_contact._equilibrium.between_nodes import displaced_at, least_depth,
 from fenics_contact._pairing.inside import InsideOf
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import sharp_at
+from fenics_contact._surfaces.corners import lie_flat
 from fenics_contact._surfaces.facets import FacetedSurface, corner_places
 from fenics_contact._surfaces.projection import Projection, node_weights, project
 from fenics_contact.errors import together
-from fenics_contact.mesh.faces import computed_rounding, vector_areas
+from fenics_contact.mesh.faces import computed_rounding
 from fenics_contact.results.resolution import BetweenNodes, CornerBetweenNodes, CornerKeptAway
 from fenics_contact.results.state import State
 
@@ -55,7 +56,7 @@ class _Corners:
         assert master is not None
         nodes = sides.nodes, sides.numbers.global_nodes(pair.master.body, master.nodes)
         hit = project(master.points[sharp], master.normals[sharp], sides.slave)
-        hit = hit.part(~_lie_flat(master, sharp[hit.point], hit.normal))
+        hit = hit.part(~lie_flat(master, sharp[hit.point], hit.normal, FLAT))
         return cls(sides, master, nodes, sharp[hit.point], hit) if len(hit.point) else None
 
     def followed(self, moved: np.ndarray) -> np.ndarray:
@@ -133,16 +134,3 @@ def _doubt(state: State, number: int, corners: _Corners, moved: np.ndarray) -> B
         return None
     where = tuple(map(float, corners.master.points[corners.node[at]]))
     return kind(scene.contacts[number].place, float(missed[at]), far, where)
-
-
-def _lie_flat(master: FacetedSurface, node: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Return which nodes of a master have a facet that lies flat on the slave, whose normals are given."""
-    areas = vector_areas(master.points, master.facets)
-    areas = areas / np.maximum(np.linalg.norm(areas, axis=1), np.finfo(float).tiny)[:, None]
-    place = np.full(len(master.nodes), -1)
-    place[node] = np.arange(len(node))
-    facet, corner = np.nonzero(place[master.facets] >= 0)
-    at = place[master.facets[facet, corner]]
-    flat = np.zeros(len(node), dtype=bool)
-    np.logical_or.at(flat, at, np.einsum("nd,nd->n", areas[facet], normal[at]) <= -FLAT)
-    return flat

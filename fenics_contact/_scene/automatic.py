@@ -16,11 +16,13 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
 from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._scene.surface_laws import ClosureLaw, check_closing
+from fenics_contact._surfaces.corners import lie_flat
+from fenics_contact._surfaces.projection import project
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces, corners_of
+from fenics_contact.mesh.faces import boundary_faces, computed_rounding, corners_of
 from fenics_contact.mesh.near_surfaces import near_surfaces
 
 if TYPE_CHECKING:
@@ -39,8 +41,9 @@ class AutomaticContact(Sequence[ContactPair]):
     The scene looks for facets that face another body within a distance, names them "near B" on A and "near
     A" on B, and makes a pair of them; look at ``scene.contacts`` and at pictures before trusting it. The
     slave is the side with linear cells if the other one has quadratic ones, else that with the smaller
-    facets; between facets alike to a tenth, that of the softer body. A side whose nodes are all held is the
-    master. Bodies named in ``self_contact`` may meet themselves wherever
+    facets; between facets alike to a tenth, that of the softer body. A side that touches first with a corner
+    or an edge, of which no face lies flat on the other side, is the slave. One whose nodes are all held is
+    the master. Bodies named in ``self_contact`` may meet themselves wherever
     they fold.
 
     Attributes:
@@ -153,9 +156,29 @@ class AutomaticContact(Sequence[ContactPair]):
         orders = [scene.bodies[side.body].mesh.order for side in sides]
         if orders[0] != orders[1]:  # what a linear master cannot follow, a quadratic slave presses on
             other_is_better = orders[1] < orders[0]
+        corners = [_touches_with_a_corner(scene, *each) for each in (sides, sides[::-1])]
+        if corners[0] != corners[1]:  # which a slave misses between its nodes
+            other_is_better = corners[1]
         if held[0] != held[1]:  # nodes that cannot move carry no multipliers
             other_is_better = held[0]
         return replace(pair, slave=sides[1], master=sides[0]) if other_is_better else pair
+
+
+def _touches_with_a_corner(scene: SceneParts, side: Surface, other: Surface, flat: float = 15.0) -> bool:
+    """Return whether a corner or an edge of a side is nearest to the other one.
+
+    `flat`: angle between faces up to which one lies flat on the other, in degrees.
+    """
+    from fenics_contact._scene.parts import sharp_at, surface_of
+
+    own, opposite = (surface_of(scene, each, "faceted") for each in (side, other))
+    sharp = np.flatnonzero(sharp_at(scene, side))
+    hit = project(own.points[sharp], own.normals[sharp], opposite)
+    hit = hit.part(~lie_flat(own, sharp[hit.point], hit.normal, float(np.cos(np.radians(flat)))))
+    if not len(hit.point):
+        return False
+    nearest = project(own.points, own.normals, opposite).gap.min()
+    return bool(hit.gap.min() <= nearest + computed_rounding(own.points))
 
 
 def _facet_size(mesh: BodyMesh) -> float:

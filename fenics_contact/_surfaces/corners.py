@@ -6,10 +6,10 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fenics_contact._surfaces.facets import faceted_surface, nodal_areas
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, nodal_areas
 from fenics_contact._surfaces.true_surface import is_crease, joints_of
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces
+from fenics_contact.mesh.faces import boundary_faces, vector_areas
 from fenics_contact.mesh.linear_facets import linear_facets
 
 _KNOWN: WeakKeyDictionary[BodyMesh, dict[tuple[str, bytes], np.ndarray]] = WeakKeyDictionary()
@@ -61,3 +61,20 @@ def _sharp(mesh: BodyMesh, nodes: np.ndarray, cuts: np.ndarray) -> np.ndarray:
     joints = joints_of(surface)
     creases = joints.corners[is_crease(surface, joints) & (joints.angle > np.radians(SHARP)), 0]
     return np.isin(nodes, surface.nodes[surface.facets.ravel()[creases]])
+
+
+def lie_flat(surface: FacetedSurface, node: np.ndarray, normal: np.ndarray, cosine: float) -> np.ndarray:
+    """Return which nodes of a surface have a facet that lies flat on the other one, shape (n,).
+
+    `node`: positions in ``surface.nodes``, shape (n,); `normal`: of the other surface there, shape (n, dim);
+    `cosine`: of the angle up to which facets lie flat.
+    """
+    areas = vector_areas(surface.points, surface.facets)
+    areas = areas / np.maximum(np.linalg.norm(areas, axis=1), np.finfo(float).tiny)[:, None]
+    place = np.full(len(surface.nodes), -1)
+    place[node] = np.arange(len(node))
+    facet, corner = np.nonzero(place[surface.facets] >= 0)
+    at = place[surface.facets[facet, corner]]
+    flat = np.zeros(len(node), dtype=bool)
+    np.logical_or.at(flat, at, np.einsum("nd,nd->n", areas[facet], normal[at]) <= -cosine)
+    return flat

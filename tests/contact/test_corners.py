@@ -10,6 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import (
+    AutomaticContact,
     Body,
     BodyMesh,
     ContactPair,
@@ -114,6 +115,22 @@ def test_a_corner_of_the_master_is_never_wrong_in_silence(strain: str, kind: str
         assert error < 0.1 or named
         wrong += error > 0.1
     assert wrong
+
+
+@pytest.mark.parametrize("strain", MATERIALS)
+@pytest.mark.parametrize("cells", [5, 8])
+def test_automatic_contact_takes_the_body_with_the_corner_for_the_slave(strain: str, cells: int) -> None:
+    """A floor of cells half as wide would be the slave otherwise, and miss the corner or turn its force."""
+    material = MATERIALS[strain]
+    floor = rectangle((-2, -1), (2, 0), (8 * cells, 4))
+    bar = turned_in_plane(rectangle((0, 0), (1, 2), (cells, 2 * cells)), TURN, ("y0", "x0"))
+    supports = [Support("floor", "y0"), Support("bar", "y1", (0.0, -0.05))]
+    bodies = {"floor": Body(floor, material), "bar": Body(bar, material)}
+    state = solve_scene(Scene(bodies, supports, contacts=AutomaticContact()), MPI.COMM_SELF)
+    assert [pair.slave.body for pair in state.scene.contacts] == ["bar"]
+    by_nodes = ContactPair(Surface("bar", "under"), Surface("floor", "y1"), discretisation="node")
+    right = solve_scene(Scene(bodies, supports, contacts=[by_nodes]), MPI.COMM_SELF)
+    require_upright(force_on(state), float(np.linalg.norm(force_on(right))))
 
 
 def test_a_corner_of_the_master_that_is_kept_away_is_named(caplog: pytest.LogCaptureFixture) -> None:
