@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.held_friction import even_friction
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.cones import TrescaLaw
 from fenics_contact.qp.face_newton import SlidingError
@@ -27,12 +30,13 @@ def solve_dual(
     if not isinstance(law, TrescaLaw) and isinstance(solver, Smalse):
         solver = FixedPoint(solver)
     try:
-        return solve(system.problem, None, solver, start, law=law)
+        found = solve(system.problem, None, solver, start, law=law)
     except SlidingError as error:
         (motion,) = rigid_motions(system.torn, (system.kernel @ error.motion)[:, None])
         rounded = {name: np.round(own, 3) + 0.0 for name, own in motion.bodies.items()}
         words = ", ".join(f"{name!r} by {motion_in_words(own)}" for name, own in rounded.items() if own.any())
         raise error.named(f"the load makes slide {words}") from error.__cause__
+    return replace(found, multiplier=even_friction(system.torn, found.multiplier))
 
 
 def row_values(system: DualSystem, solution: DualSolution) -> RowValues:
