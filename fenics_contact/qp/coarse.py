@@ -277,6 +277,14 @@ class CoarseSpace:
         """Return (G G^T)^-1 G x, shape (m,), replicated. Collective."""
         return self.solve(self.apply(x))
 
+    def fitted(self, x: Vector) -> Vector:
+        """Return `coefficients`, refined once. Collective.
+
+        Otherwise rounding of large motions would move other, unloaded bodies.
+        """
+        alpha = self.coefficients(x)
+        return alpha + self.coefficients(x - self.transpose(alpha))
+
     def project(self, x: Vector) -> Vector:
         """Return P x = x - G^T (G G^T)^-1 G x, owned. Collective."""
         return x - self.transpose(self.coefficients(x))

@@ -82,12 +82,8 @@ class FaceSystem:
         return self.face.prolong(step)
 
     def motions(self, gradient: Vector) -> Vector:
-        """Return α, the least-squares fit of rigid motions to a gradient on the face, replicated. Collective.
-
-        Refined once: otherwise rounding of large motions would move other, unloaded bodies.
-        """
-        alpha = self.coarse.coefficients(gradient)
-        return alpha + self.coarse.coefficients(gradient - self.coarse.transpose(alpha))
+        """Return α, the least-squares fit of rigid motions to a gradient on the face. Collective."""
+        return self.coarse.fitted(gradient)
 
     def weighted_norm(self, y: Vector, weights: Vector) -> float:
         """Return the global norm of weights · y. Collective."""

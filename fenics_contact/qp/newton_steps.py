@@ -490,6 +490,8 @@ class FaceSteps:
     ) -> Vector:
         """Return α of a multiplier of a face, from the rows of the face. Collective."""
         alpha = linear.motions(system.gradient(multiplier, product - self.problem.rhs))
+        if system.coarse.gram.null_space.shape[1] == 0:
+            return alpha
         return keep_free_motions(system.coarse, before.motions(self.problem), alpha)
 
     def _record(self, number: int, taken: Damped[Iterate], solved: _SolvedFace, changed: int) -> SolverStep:

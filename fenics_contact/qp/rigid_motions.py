@@ -77,8 +77,6 @@ class RigidMotionCorrection:
 
 def keep_free_motions(face: CoarseSpace, earlier: Vector, alpha: Vector) -> Vector:
     """Return α with the motions that a face leaves undetermined unchanged."""
-    if face.gram.null_space.shape[1] == 0:
-        return alpha
     basis, _ = np.linalg.qr(face.gram.null_space)
     return np.asarray(alpha + basis @ (basis.T @ (earlier - alpha)), dtype=np.float64)
 

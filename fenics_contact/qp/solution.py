@@ -336,7 +336,7 @@ class Iterate:
 
     def motions(self, problem: DualProblem) -> Vector:
         """Return the α of r = F λ − d − Gᵀα, shape (m,), replicated. Collective."""
-        return problem.coarse.coefficients(self.product - problem.rhs - self.residual)
+        return problem.coarse.fitted(self.product - problem.rhs - self.residual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -471,7 +471,7 @@ class Certificate:
 
 def certify(problem: DualProblem, multiplier: Vector, product: Vector, residual: Vector) -> Certificate:
     """Recompute α and residuals of λ with its exact product F λ, from the α of a solver's r. Collective."""
-    alpha = problem.coarse.coefficients(product - problem.rhs - residual)
+    alpha = problem.coarse.fitted(product - problem.rhs - residual)
     return Certificate(problem, answer_at(problem, multiplier, product, alpha), alpha)
 
 

@@ -149,3 +149,12 @@ def test_rounding_of_bodies_that_move_far_moves_no_others(seed):
     found = FaceSystem(MPI.COMM_SELF, face, lambda x: x, coarse).motions(G.T @ alpha)
     np.testing.assert_allclose(found[:n], alpha[:n], rtol=1e-11)
     assert np.abs(found[n:-1]).max() < 1e-16
+
+
+def test_motions_are_fitted_to_their_last_places() -> None:
+    """In a long chain of pieces, each glued to the next, errors of the solution add up."""
+    n = 400
+    chain = sp.diags([np.ones(n), -np.ones(n - 1)], [0, 1], format="csr")
+    coarse, alpha = CoarseSpace(MPI.COMM_SELF, chain, np.zeros(n)), np.sin(np.arange(n))
+    x = coarse.transpose(alpha)
+    np.testing.assert_allclose(coarse.transpose(coarse.fitted(x)), x, rtol=0.0, atol=2 * np.finfo(float).eps)
