@@ -13,7 +13,7 @@ import numpy as np
 
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
-from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._pairing.points import HELD, ContactPoints
 from fenics_contact._pairing.search import MortarPoints
 from fenics_contact._scene.fields import gradients_of
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
@@ -33,7 +33,7 @@ from fenics_contact.design.surface_derivatives import (
     projection_pulled_back,
     slopes_pulled_back,
 )
-from fenics_contact.errors import together
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.shapes.simple import evaluate_shape
@@ -273,6 +273,17 @@ class RowFields(PointMotions):
     friction: np.ndarray
 
 
+def _require_own_rows(torn: TornSystem, points: ContactPoints) -> None:
+    """Reject means over the facets at two periodic edges, whose shares would change with the shape."""
+    diagonal = np.asarray(points.master[np.arange(points.count), points.slave]).ravel()
+    if torn.constraints is not None and np.any(np.abs(diagonal) > HELD):
+        raise InvalidInputError(
+            "derivatives by the shape need surfaces that end at periodic edges to meet alike at both, got "
+            f"{np.count_nonzero(np.abs(diagonal) > HELD)} points that are means over different facets: give "
+            "both surfaces the same cells, or discretisation='node'"
+        )
+
+
 def contact_by_shape(
     torn: TornSystem, fields: PairedFields, by_bound: np.ndarray, by_area: np.ndarray | float
 ) -> np.ndarray:
@@ -286,6 +297,7 @@ def contact_by_shape(
     result = np.zeros((tearing.n_nodes, torn.components))
     if points.count == 0:
         return result
+    _require_own_rows(torn, points)
     rows = _row_fields(torn, fields)
     by_area = bounds_by_area(torn, rows.normal[0], by_bound) + by_area
     with together(torn.decomposition.comm):
@@ -437,6 +449,7 @@ def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
     result = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
     if torn.ties.count == 0:
         return result
+    _require_own_rows(torn, torn.ties)
     masters = [tie.master for tie in torn.scene.ties]
     motions = point_motions(torn, torn.ties, masters, fields)
     forces = _forces(torn, fields.multipliers)

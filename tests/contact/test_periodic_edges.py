@@ -26,6 +26,8 @@ from fenics_contact import (
     solve_scene,
     solve_steps,
 )
+from fenics_contact.design.contact_derivatives import contact_by_shape
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.mesh import quadratic
@@ -103,15 +105,18 @@ def test_tied_periodic_layers_are_one() -> None:
     assert below[2] == pytest.approx(SUNK * stiffness("normal"), rel=1e-7)
 
 
+def on_other_cells(scene: Scene, count: int, cells: Literal["hexahedron", "tetrahedron"]) -> Scene:
+    finer = block((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (count, count, 1), cells)
+    return replace(scene, bodies={**scene.bodies, "low": Body(finer, LAWS["low"])})
+
+
 @pytest.mark.parametrize(("count", "cells"), [(2, "tetrahedron"), (3, "hexahedron"), (5, "tetrahedron")])
 @pytest.mark.parametrize("mu", [0.05, 0.9])
 def test_points_at_periodic_edges_are_means_over_both_sides_where_meshes_differ(
     count: int, cells: Literal["hexahedron", "tetrahedron"], mu: float
 ) -> None:
     """By mortar their rows differ, as facets at both edges do, and yet depend on each other."""
-    scene = stack(3, second=False, mu=mu)
-    finer = block((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (count, count, 1), cells)
-    other = replace(scene, bodies={**scene.bodies, "low": Body(finer, LAWS["low"])})
+    other = on_other_cells(stack(3, second=False, mu=mu), count, cells)
     held = [Support("low", "z0"), Support("up", "z1", (DRAWN, 0.0, -SUNK))]
     contact = solve_scene(replace(other, supports=held), MPI.COMM_SELF, tolerance=1e-10).contact
     assert contact.points.count == 4
@@ -119,6 +124,12 @@ def test_points_at_periodic_edges_are_means_over_both_sides_where_meshes_differ(
     np.testing.assert_allclose(contact.normal_force, 0.25 * pressure, rtol=1e-7)
     shear = min(mu * pressure, DRAWN * stiffness("shear"))
     np.testing.assert_allclose(np.linalg.norm(contact.friction_force, axis=1), 0.25 * shear, rtol=1e-6)
+
+
+def test_derivatives_of_means_over_different_facets_are_refused() -> None:
+    state = solve_scene(on_other_cells(stack(second=False), 3, "hexahedron"), MPI.COMM_SELF)
+    with pytest.raises(InvalidInputError, match="end at periodic edges to meet alike at both, got 3 points"):
+        contact_by_shape(state.torn, None, np.zeros(4), 0.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("periodic", ["up", "low"])
