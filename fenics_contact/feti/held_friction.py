@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import cho_factor, cho_solve
 
 from fenics_contact._pairing.points import HELD
 from fenics_contact._scene.local_axes import free_part
@@ -89,13 +90,13 @@ def _evened(
     the bounds.
     """
     weighted, width, wanted = ways / area[:, None], len(tau) // len(bound), np.zeros(len(rows))
-    gram, found = weighted.T @ ways, tau.copy()
+    gram, found = cho_factor(weighted.T @ ways), tau.copy()
     mine = np.zeros(len(tau), dtype=bool)
     mine[rows] = True
     others = np.where(mine, 0.0, tau).reshape(-1, width)
     room = np.sqrt(np.maximum(bound**2 - np.einsum("na,na->n", others, others), 0.0))
     for _ in range(most):
-        found[rows] += ways @ np.linalg.solve(gram, weighted.T @ (wanted - found[rows]))
+        found[rows] += ways @ cho_solve(gram, weighted.T @ (wanted - found[rows]))
         size = np.linalg.norm(np.where(mine, found, 0.0).reshape(-1, width), axis=1)
         if (size - room).max() <= near * bound.max():
             return found
