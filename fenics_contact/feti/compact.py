@@ -103,7 +103,7 @@ class CompactOperator:
         """
         self._subdomain, self._interface, self._insides = subdomain, interface, insides
         self._size, typical = len(interface), subdomain.typical_stiffness
-        factor, modes, self._rho = regular_factor(schur, subdomain.kernel[interface], typical)
+        factor, modes, self._rho, _ = regular_factor(schur, subdomain.kernel[interface], typical)
         self._modes = modes.astype(np.float32)
         self._unit = float(np.square(factor.diagonal()).max())
         factor /= np.sqrt(self._unit)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -99,17 +100,32 @@ class Condensations:
         return self._last[1](stiffness)
 
 
+class RegularFactor(NamedTuple):
+    """The lower Cholesky factor of S + ρ Q Qᵀ.
+
+    Attributes:
+        modes: Q, orthonormal.
+        rho: ρ.
+        least: About the least eigenvalue of the matrix scaled to a diagonal of ones.
+    """
+
+    lower: np.ndarray
+    modes: np.ndarray
+    rho: float
+    least: float
+
+
 def regular_factor(
     schur: np.ndarray, kernel: np.ndarray, typical: float, rounded: float = 2e-15
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the lower Cholesky factor of S + ρ Q Qᵀ, Q and ρ, overwriting ``schur``.
+) -> RegularFactor:
+    """Return the Cholesky factor of S + ρ Q Qᵀ, overwriting ``schur``.
 
     Q is the trace of the kernel on the interface, orthonormal, shape (n_b, n_modes). ρ is the largest
     diagonal entry of S. Where that is rounding compared with the typical stiffness, every displacement of the
     interface is a rigid motion, as in a statically determinate body.
 
-    `rounded`: least eigenvalue that is rounding, of the matrix scaled to a diagonal of ones. A motion without
-    energy has 1e-17 to 2e-15, whatever the nodes that it moves; cells of aspect 1000 have 1e-14.
+    `rounded`: least eigenvalue of the scaled matrix that is rounding. A motion without energy has 1e-17 to
+    2e-15, whatever the nodes that it moves; cells of aspect 1000 have 1e-14.
 
     Raises:
         InvalidInputError: If S has another kernel than that given.
@@ -121,14 +137,15 @@ def regular_factor(
     diagonal = filled.diagonal().copy()
     factor, failed = lapack.dpotrf(filled, lower=1, overwrite_a=1)
     # Where a motion has no energy its pivot is rounding, which may be positive.
-    if failed or _least_eigenvalue(factor, diagonal) <= rounded:
+    least = 0.0 if failed else _least_eigenvalue(factor, diagonal)
+    if least <= rounded:
         row = failed or int((factor.diagonal() ** 2 / diagonal).argmin()) + 1
         raise InvalidInputError(
             "the stiffness of every subdomain must be positive definite up to its kernel, but its Schur "
             f"complement loses definiteness in row {row}: check the material and the kernel of the model; "
             f"{ONE_LAYER}"
         )
-    return factor, modes, float(rho)
+    return RegularFactor(factor, modes, float(rho), least)
 
 
 def _least_eigenvalue(factor: np.ndarray, diagonal: np.ndarray, sweeps: int = 2) -> float:

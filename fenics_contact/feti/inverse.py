@@ -27,6 +27,9 @@ from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_do
 class ExplicitOperator:
     """(K⁺)_bb and S as packed triangles; S, used only for preconditioning, in single precision.
 
+    In double precision, too, where foundations alone resist some motion, so little that S loses definiteness
+    in single precision: that of a stiff body on a soft bed.
+
     Where many subdomains are alike, as whole matrices: one product then reads them once for all.
 
     With the trace Q of the kernel on the interface, orthonormal, S + ρ Q Qᵀ is positive definite, and
@@ -43,16 +46,27 @@ class ExplicitOperator:
 
     pays_from = Rates.whole  # what the plan counts with
 
-    def __init__(self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations) -> None:
+    def __init__(
+        self,
+        subdomain: Subdomain,
+        interface: np.ndarray,
+        condensations: Condensations,
+        single: float = 1e-6,
+    ) -> None:
         """Condense a subdomain on its interface.
 
-        `interface`: interface dofs b, shape (n_b,).
+        `interface`: interface dofs b, shape (n_b,); `single`: least eigenvalue of S, scaled, in single
+        precision.
         """
         stiffness, self._interface = subdomain.stiffness, interface
         schur = condensations.schur_complement(stiffness, interface)
         self._unit = float(np.abs(schur).max(initial=0.0)) or 1.0
-        self._stiff, _ = lapack.strttp((schur / self._unit).astype(np.float32, order="F"), uplo="L")
-        self._flexible = _packed_inverse(schur, subdomain.kernel[interface], subdomain.typical_stiffness)
+        self._stiff = _packed((schur / self._unit).astype(np.float32, order="F"))
+        factor = regular_factor(schur, subdomain.kernel[interface], subdomain.typical_stiffness)
+        self._flexible = _packed(lapack.dpotri(factor.lower, lower=1, overwrite_c=1)[0])
+        if subdomain.foundations and factor.least < single:
+            schur = condensations.schur_complement(stiffness, interface)
+            self._stiff = _packed(np.asfortranarray(schur / self._unit))
         self._size = len(interface)
         self._inside = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
         rows = stiffness[self._inside]
@@ -77,25 +91,24 @@ class ExplicitOperator:
     def share(self) -> None:
         """Store whole matrices from now on."""
         if self._flexible.ndim == 1:
-            self._flexible = _whole(lapack.dtpttr(self._size, self._flexible, uplo="L")[0])
-            self._stiff = _whole(lapack.stpttr(self._size, self._stiff, uplo="L")[0])
+            self._flexible, self._stiff = (_whole(self._size, each) for each in (self._flexible, self._stiff))
 
     def flex_all(self, forces: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times interface forces of several subdomains alike, the rows, shape (k, n_b)."""
         return np.asarray(forces @ self._flexible)
 
     def stiffen_all(self, displacements: np.ndarray) -> np.ndarray:
-        """Return S, rounded to single precision, times interface displacements, the rows, shape (k, n_b)."""
+        """Return S, in its precision, times interface displacements, the rows, shape (k, n_b)."""
         size = np.abs(displacements).max(axis=1, initial=0.0)
         usual = (size > 0.0) & np.isfinite(size)
         scale = np.where(usual, size, 1.0)[:, None]
-        scaled = np.where(usual[:, None], displacements / scale, 0.0).astype(np.float32)
+        scaled = np.where(usual[:, None], displacements / scale, 0.0).astype(self._stiff.dtype)
         forces = (scaled @ self._stiff) * (self._unit * scale)
         forces[~usual] = size[~usual, None]
         return np.asarray(forces)
 
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
-        """Write S, rounded to single precision, times an interface displacement into ``force``.
+        """Write S, in its precision, times an interface displacement into ``force``.
 
         The range of single precision suffices neither for all units nor for diverging iterates: both factors
         are scaled.
@@ -107,8 +120,9 @@ class ExplicitOperator:
         if size == 0.0 or not np.isfinite(size):
             force[:] = size
             return
-        scaled = (displacement / size).astype(np.float32)
-        force[:] = blas.sspmv(self._size, 1.0, self._stiff, scaled, lower=1)
+        scaled = (displacement / size).astype(self._stiff.dtype)
+        (product,) = blas.get_blas_funcs(("spmv",), (self._stiff,))
+        force[:] = product(self._size, 1.0, self._stiff, scaled, lower=1)
         force *= self._unit * size
 
     def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -162,19 +176,19 @@ class ExplicitOperator:
         return solution
 
 
-def _whole(lower: np.ndarray) -> np.ndarray:
-    """Return the symmetric matrix of a lower triangle, whose other entries are zero."""
+def _packed(matrix: np.ndarray) -> np.ndarray:
+    """Return the packed lower triangle of a matrix, in its precision."""
+    (pack,) = lapack.get_lapack_funcs(("trttp",), (matrix,))
+    return np.asarray(pack(matrix, uplo="L")[0])
+
+
+def _whole(size: int, packed: np.ndarray) -> np.ndarray:
+    """Return the symmetric matrix of a packed lower triangle."""
+    (unpack,) = lapack.get_lapack_funcs(("tpttr",), (packed,))
+    lower = unpack(size, packed, uplo="L")[0]
     whole = lower + lower.T
     np.fill_diagonal(whole, lower.diagonal())
     return np.asarray(whole)
-
-
-def _packed_inverse(schur: np.ndarray, kernel: np.ndarray, typical: float) -> np.ndarray:
-    """Return the packed lower triangle of (S + ρ Q Qᵀ)⁻¹, overwriting ``schur``."""
-    factor = regular_factor(schur, kernel, typical)[0]
-    inverse, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
-    packed, _ = lapack.dtrttp(inverse, uplo="L")
-    return np.asarray(packed)
 
 
 class Inverse(Protocol):

@@ -239,3 +239,21 @@ def test_a_wrong_stiffness_in_a_scene_file_is_one_mistake(stiffness: object, wor
     with pytest.raises(SceneFileError, match=words) as caught:
         read_scene_file({"foundations": foundations}, MPI.COMM_SELF)
     assert str(caught.value).count("stiffness must be") == 1
+
+
+@pytest.mark.parametrize("boxes", [1, 4])
+@pytest.mark.parametrize("young", [1e9, 1e10, 1e12])
+def test_a_stiff_block_on_a_soft_bed_sinks_and_tips_as_a_rigid_one(young: float, boxes: int) -> None:
+    """By N / (k A) − x M / (k I); its bed is softer than it by up to a billion."""
+    mesh, bed, force, moment = block((-3.0, 0.0, 0.0), (3.0, 1.0, 2.0), (12, 1, 4)), 1e3, 900.0, 1350.0
+    scene = Scene(
+        {"f": Body(mesh, IsotropicElasticity(young, 0.0))},
+        [Support("f", "y0", (None, 0.0, None))],
+        [TotalForce("f", "z1", (0.0, 0.0, -force), moment=(0.0, moment, 0.0))],
+        foundations=[ElasticFoundation("f", "z0", (bed, bed, bed))],
+    )
+    partitions = {"f": box_partition(mesh, (boxes, 1, 1))}
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions)
+    exact = -force / (bed * 6.0) - mesh.points[:, 0] * moment / (bed * 18.0)
+    np.testing.assert_allclose(state.gather_displacement("f")[:, 2], exact, atol=3e-6)
+    assert state.solution.products < 30

@@ -26,7 +26,7 @@ def test_a_schur_complement_with_a_further_null_vector_is_refused_whatever_its_r
     accepted = 0
     for seed in SEEDS:
         schur, null = semidefinite(seed)
-        factor, modes, rho = regular_factor(schur.copy(order="F"), null, 1.0)
+        factor, modes, rho, _ = regular_factor(schur.copy(order="F"), null, 1.0)
         found, exact = np.tril(factor) @ np.tril(factor).T, schur + rho * modes @ modes.T
         np.testing.assert_allclose(found, exact, atol=1e-12)
         with pytest.raises(InvalidInputError, match=r"loses definiteness in row \d+: .*two layers"):
@@ -44,7 +44,7 @@ def test_a_schur_complement_that_bends_as_flat_cells_do_is_factored(unit: float)
         vectors, _ = np.linalg.qr(random.standard_normal((40, 40)))
         values = np.append([0.0, *random.uniform(1e-13, 1e-12, 9)], random.uniform(0.1, 10.0, 30))
         schur = np.asfortranarray(unit * (vectors * values) @ vectors.T)
-        factor, modes, rho = regular_factor(schur.copy(order="F"), vectors[:, :1], unit)
+        factor, modes, rho, _ = regular_factor(schur.copy(order="F"), vectors[:, :1], unit)
         found = np.tril(factor) @ np.tril(factor).T
         np.testing.assert_allclose(found, schur + rho * modes @ modes.T, atol=1e-13 * unit)
 
