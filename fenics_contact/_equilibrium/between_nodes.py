@@ -24,7 +24,9 @@ from fenics_contact._scene.pairs import Surface
 from fenics_contact._surfaces.facets import corner_places, edge_distance
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.feti.torn import TornSystem, with_points
 from fenics_contact.results.contact import ContactResult
+from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.resolution import BetweenNodes
 from fenics_contact.results.state import State
 
@@ -150,9 +152,7 @@ def displaced_at(state: State, nodes: np.ndarray) -> np.ndarray:
 def _deepest(
     inside: InsideOf, undeformed: InsideOf, number: int, facets: np.ndarray, displaced: np.ndarray
 ) -> Missed | None:
-    def gaps_at(facet: np.ndarray, local: np.ndarray) -> np.ndarray:
-        return inside.at(facet, local).gap(displaced)
-
+    gaps_at = _gaps(inside, displaced)
     rounding = LAST_PLACES * float(np.abs(inside.slave.points).max())
     deepest = deepest_points(inside.slave.corners, facets, gaps_at, rounding)
     if not len(deepest.facet):
@@ -205,6 +205,14 @@ def _displaced(state: State, inside: InsideOf, facets: np.ndarray) -> np.ndarray
     return displaced_at(state, np.unique(np.concatenate(nodes)))
 
 
+def with_places(torn: TornSystem, places: InFacets) -> TornSystem:
+    """Return a system whose points are at nodes with some of them inside facets. Collective."""
+    decomposition = torn.decomposition
+    with together(decomposition.comm):
+        points = points_inside(torn.scene, torn.points, places, decomposition.fixed, decomposition.axes)
+    return with_points(torn, points)
+
+
 class InsideFacets:
     """Points of a system that go inside facets of its slaves, where a state misses contact.
 
@@ -212,18 +220,20 @@ class InsideFacets:
     That is an open node, else the one that presses least; if it lies in the master then, its row comes back.
     """
 
-    def __init__(self, at_nodes: ContactPoints) -> None:
+    def __init__(self, dim: int) -> None:
         """Start with all points at their nodes."""
-        self._at_nodes = at_nodes
-        self._stay = np.zeros(at_nodes.count, dtype=bool)
+        self._stay = InFacets.none(dim)
 
-    def after(self, state: State) -> ContactPoints | None:
-        """Return other points than those of a state, None where it misses nothing more. Collective."""
-        decomposition, contact = state.torn.decomposition, state.contact
-        known = InFacets.of(contact.points)
-        needed = np.isin(known.point, _needed_nodes(state, self._at_nodes))
-        self._stay[known.point[needed]] = True
-        kept, busy = known.part(~needed), self._stay.copy()
+    def after(self, state: State, needed_nodes: np.ndarray) -> InFacets | None:
+        """Return other places than those of a state, None where it misses nothing more. Collective.
+
+        `needed_nodes`: points inside facets whose nodes now lie in the master, shape (k,).
+        """
+        points, known = state.contact.points, InFacets.of(state.contact.points)
+        needed = np.isin(known.point, needed_nodes)
+        self._stay = InFacets.join([self._stay, known.part(needed).by_key(points)])
+        kept, busy = known.part(~needed), np.zeros(points.count, dtype=bool)
+        busy[self._stay.by_number(points).point] = True
         found = [replace(kept, relief=_relieved(state, kept))]
         busy[known.point] = True
         for number in range(len(state.scene.contacts)):
@@ -235,19 +245,18 @@ class InsideFacets:
         places = InFacets.join(found)
         if len(places.point) == len(known.point) and np.array_equal(places.relief, known.relief):
             return None
-        with together(decomposition.comm):
-            fixed, axes = decomposition.fixed, decomposition.axes
-            return points_inside(state.scene, self._at_nodes, places, fixed, axes)
+        return places
 
     @staticmethod
     def _is_found(state: State, number: int) -> bool:
         """Return whether nodes find a contact: where more of them press than a facet has, facets do not.
 
-        Between two bodies one node or mean is enough.
+        Between two bodies one node or mean is enough; nonlinear ones have points on each other at nodes.
         """
         pressing = np.count_nonzero(state.contact.normal_force[state.contact.on_pair(number)] > 0.0)
-        bodies = isinstance(state.scene.contacts[number].master, Surface)
-        return bool(pressing > (0 if bodies else 2 ** (state.scene.dim - 1)))
+        if not isinstance(state.scene.contacts[number].master, Surface):
+            return bool(pressing > 2 ** (state.scene.dim - 1))
+        return bool(pressing > 0) or not isinstance(state, LinearState)
 
 
 def _pressing(state: State, missed: Missed, busy: np.ndarray) -> InFacets:
@@ -271,21 +280,35 @@ def _relieved(state: State, kept: InFacets) -> np.ndarray:
     """Return the reliefs of points inside facets that belong to their forces, (k,), [length]. Collective.
 
     A force that presses its point in by c belongs to RELIEF / (1 − RELIEF) c. Where bodies give way, a point
-    begins with more; between it and the relief at which it has no force, c is linear.
+    begins with more; between it and the relief at which it has no force, c is linear. In a load step that
+    presses further a point that it began with has as much as one that is new.
     """
     points, comm = state.contact.points, state.torn.decomposition.comm
-    pressed_in, wanted = np.zeros(len(kept.point)), RELIEF / (1.0 - RELIEF)
+    (pressed_in, bulge), wanted = np.zeros((2, len(kept.point))), RELIEF / (1.0 - RELIEF)
     for number in np.unique(points.pair[kept.point]):
         mine = np.flatnonzero(points.pair[kept.point] == number)
-        inside = InsideOf.of(state.scene, state.scene.contacts[int(number)])
+        undeformed = InsideOf.of(state.scene, state.scene.contacts[int(number)])
+        inside = where_they_are(state, undeformed, int(number))
         displaced = _displaced(state, inside, mine)
         at = kept.facet[mine], kept.local[mine]
         with together(comm):
-            pressed_in[mine] = inside.pressed_in(*at, _opened(inside, inside, displaced))
-    pressed_in = comm.bcast(pressed_in)
+            pressed_in[mine] = inside.pressed_in(*at, _opened(inside, undeformed, displaced))
+            bulge[mine] = inside.bulge(*at, _gaps(inside, displaced))
+    pressed_in, bulge = comm.bcast((pressed_in, bulge))
     open_ = kept.relief / RELIEF
     new = wanted * pressed_in * open_ / np.maximum(open_ - kept.relief + wanted * pressed_in, TINY)
-    return np.where(new < ENOUGH * kept.relief, new, kept.relief)
+    new = np.where(new < ENOUGH * kept.relief, new, kept.relief)
+    further = RELIEF * np.minimum(bulge, kept.relief + pressed_in)
+    return np.where(kept.relief < ENOUGH * further, further, new)
+
+
+def _gaps(inside: InsideOf, displaced: np.ndarray) -> GapsAt:
+    """Return the gaps at points of facets."""
+
+    def gaps_at(facet: np.ndarray, local: np.ndarray) -> np.ndarray:
+        return inside.at(facet, local).gap(displaced)
+
+    return gaps_at
 
 
 def _opened(inside: InsideOf, undeformed: InsideOf, displaced: np.ndarray) -> GapsAt:
@@ -299,7 +322,22 @@ def _opened(inside: InsideOf, undeformed: InsideOf, displaced: np.ndarray) -> Ga
     return opened_at
 
 
-def _needed_nodes(state: State, at_nodes: ContactPoints) -> np.ndarray:
+def needed_nodes_on_obstacles(state: State) -> np.ndarray:
+    """Return the points inside facets whose nodes now lie in an obstacle, shape (k,). Collective."""
+    points, needed = state.contact.points, [np.zeros(0, dtype=np.int64)]
+    which = points.are_inside
+    for number in np.unique(points.pair[which]):
+        mine = which[points.pair[which] == number]
+        undeformed = InsideOf.of(state.scene, state.scene.contacts[int(number)])
+        inside = where_they_are(state, undeformed, int(number))
+        displaced = _displaced(state, inside, mine)
+        at = inside.at_nodes(np.searchsorted(inside.nodes, points.slave[mine]))
+        gap, before = inside.at(*at).gap(displaced), undeformed.at(*at).distance
+        needed.append(mine[gap < -SHARE * np.abs(gap - before)])
+    return np.concatenate(needed)
+
+
+def needed_nodes(state: State, at_nodes: ContactPoints) -> np.ndarray:
     """Return the points inside facets whose nodes now lie in the master, shape (k,). Collective."""
     points = state.contact.points
     which = points.are_inside

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes_on_obstacles, with_places
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.other_rows import prescribed_as_is
 from fenics_contact._equilibrium.starts import carried_over
@@ -26,6 +27,7 @@ from fenics_contact._large_deformations.loading import Loading
 from fenics_contact._large_deformations.moving_contact import Contact, ContactConfiguration, MovingContact
 from fenics_contact._large_deformations.newton import Effort, NonlinearEquilibrium, NotHeldError
 from fenics_contact._large_deformations.rigid_surfaces import driven_further
+from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.local_axes import free_part
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import RigidSurface
@@ -66,6 +68,7 @@ class DeformedEquilibria:
         self._equations = Equations(scene, decomposition)
         self._assembled: TornSystem | None = None if known is None else known._assembled
         self._unresisted: tuple[UnheldMotion, ...] | None = None
+        self._places = InFacets.none(scene.dim)
 
     def solve(
         self,
@@ -76,8 +79,38 @@ class DeformedEquilibria:
         step: LoadStep | None = None,
         *,
         overlap: bool = False,
+        most: int = 4,
     ) -> DeformedState:
-        """Compute the equilibrium of a scene. Collective."""
+        """Compute the equilibrium of a scene. Collective.
+
+        `most`: how often other points are looked for, inside facets that are pierced between their nodes.
+        """
+        places: InFacets | None = _places_of(before, scene.dim)
+        inside = InsideFacets(scene.dim)
+        for _ in range(1 + (0 if overlap else most)):
+            if places is None:
+                break
+            self._put_inside(places)
+            state = self._solve(scene, before, tolerance, time, step, overlap=overlap)
+            found = inside.after(state, needed_nodes_on_obstacles(state))
+            places = None if found is None else found.by_key(state.contact.points)
+        return state
+
+    def _put_inside(self, places: InFacets) -> None:
+        """Put points inside facets of slaves, by key, all others at nodes."""
+        self._places = places
+        self._equations.contact.put_inside(places)
+
+    def _solve(
+        self,
+        scene: Scene,
+        before: State | CarriedState | None,
+        tolerance: Tolerance,
+        time: float,
+        step: LoadStep | None,
+        *,
+        overlap: bool,
+    ) -> DeformedState:
         steps = self._steps
         if tolerance is not None:
             if not isinstance(tolerance, float):
@@ -96,6 +129,7 @@ class DeformedEquilibria:
                 acted, known = before.load, before.equilibrium.linearisation
                 start = before.equilibrium.configuration
                 same = before.torn.decomposition is self.decomposition
+                same = same and self._places.are_those_of(_places_of(before, scene.dim))
                 if not (same and contacts_alike(scene, before.scene)):
                     (acted, start), known = self._held_otherwise(scene, before), None
         self._require_later(scene, start.time, time)
@@ -134,6 +168,7 @@ class DeformedEquilibria:
     def restored(self, stored: Stored, scene: Scene) -> DeformedState:
         """Build a state from what `stored_deformed` returned, with one factorisation. Collective."""
         timer, equations = self._timer, self._equations
+        self._put_inside(InFacets.restored(stored, scene.dim))
         with timer.phase("assemble"):
             load = whole = self._loading(scene, float(stored["times"][1]))
             at, load = stored_configuration(stored, load, equations.contact, self.decomposition)
@@ -229,7 +264,16 @@ class DeformedEquilibria:
         """Return what acts at a time. Collective."""
         load = Loading.of(scene, self.decomposition, time, self._assembled, step=step, overlap=overlap)
         self._assembled = load.torn
-        return load
+        if scene.deforms_much:
+            return load
+        return replace(load, torn=with_places(load.torn, self._places.by_number(load.torn.points)))
+
+
+def _places_of(before: State | CarriedState | None, dim: int) -> InFacets:
+    """Return the places inside facets of a state before, by key, none on other meshes."""
+    if not isinstance(before, DeformedState):
+        return InFacets.none(dim)
+    return InFacets.of(before.contact.points).by_key(before.contact.points)
 
 
 def _balanced(evaluation: ResidualState) -> Configuration:
@@ -408,6 +452,7 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     parts = [(mesh.body, mesh.cells, values) for mesh, values in pairs if values is not None]
     history = History.unloaded(state.scene).advanced(comm, parts)
     stored |= {f"history.{name}": values for name, values in history.values.items()}
+    stored |= _places_of(state, state.scene.dim).stored()
     points, start = evaluation.contact.points, evaluation.contact.start
     if points is None or start is None:
         torn = evaluation.torn

@@ -14,7 +14,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
-from fenics_contact._equilibrium.between_nodes import InsideFacets
+from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes, with_places
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
 from fenics_contact._equilibrium.other_rows import has_rows_of, on_rows_of, with_kept
@@ -29,7 +29,7 @@ from fenics_contact._equilibrium.starts import (
 from fenics_contact._equilibrium.static_admissibility import check_held
 from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact._equilibrium.warnings import ContactWarnings
-from fenics_contact._pairing.inside import InFacets, points_inside
+from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.memory import Fit
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.plan import SolverKind, choose_solver
@@ -41,13 +41,7 @@ from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.same_input import check_same_input
-from fenics_contact.feti.torn import (
-    TornSystem,
-    build_torn_system,
-    check_apart,
-    with_points,
-    with_points_inside,
-)
+from fenics_contact.feti.torn import TornSystem, build_torn_system, check_apart, with_points_inside
 from fenics_contact.qp.face_newton import ProjectedCG
 from fenics_contact.qp.in_turn import InTurn
 from fenics_contact.qp.solution import DualSolution
@@ -136,14 +130,14 @@ class LinearEquilibria:
         """
         torn, passes = state.torn, Passes(lambda system_of, last: solved(system_of, last, None), None)
         passes.add(state)
-        inside = InsideFacets(torn.points)
+        inside = InsideFacets(torn.scene.dim)
         for _ in range(most):
             with self._timer.phase("state"):
-                points = inside.after(state)
-            if points is None:
+                places = inside.after(state, needed_nodes(state, torn.points))
+            if places is None:
                 break
             with self._timer.phase("assemble"):
-                others = with_points(torn, points)
+                others = with_places(torn, places)
                 others = others.with_slip_from(*self._slip_origin(before, others)) if before else others
             state = passes.run(others)
         return state if passes.count == 1 else passes.answer(state)
@@ -246,10 +240,7 @@ class LinearEquilibria:
         if not stored:
             return self._directly(torn, known)
         with self._timer.phase("assemble"):
-            fixed, axes = self._decomposition.fixed, self._decomposition.axes
-            with together(self._decomposition.comm):
-                points = points_inside(scene, torn.points, InFacets.restored(stored), fixed, axes)
-            torn = with_stored_slip(with_points(torn, points), stored)
+            torn = with_stored_slip(with_places(torn, InFacets.restored(stored, scene.dim)), stored)
         if "coefficient" in stored:
             from fenics_contact._equilibrium.slip_dependence import with_coefficients
 

@@ -124,6 +124,7 @@ class ContactWarnings:
                 peaks.append(doubt)
                 # Load histories pass through first touches: what is pressed is named in the states alone.
                 small = deepest > 0.0 and not isinstance(doubt, CornerBetweenNodes | CornerKeptAway)
+                small &= not np.isin(state.contact.on_pair(number), state.contact.points.are_inside).any()
                 self._log_doubt(state, Doubt(number, Kind.INSIDE_FACETS, doubt.warning, small))
             if deepest <= computed_rounding(scene.bodies[pair.slave.body].mesh.points):
                 continue  # nothing presses

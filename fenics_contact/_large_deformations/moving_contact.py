@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
 from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.local_axes import free_matrix
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane, RigidTool
 from fenics_contact._scene.pairs import Surface
@@ -450,6 +451,9 @@ class ContactConfiguration:
 class Contact:
     """Contact at the points of the undeformed bodies: small displacements."""
 
+    def put_inside(self, places: InFacets) -> None:
+        """Put points of pairs with obstacles inside facets of slaves, by key, all others at nodes."""
+
     def longest_part(self, first: Loading, last: Loading) -> float:
         """Return the part between two loads in which contact points can be found again. Collective."""
         return 1.0
@@ -471,7 +475,7 @@ class MovingContact(Contact):
         """Prepare the surfaces of all pairs. Collective."""
         from fenics_contact._pairing.sliding.contact import SlidingContact  # only for bodies that move far
 
-        self._sliding = SlidingContact.of(
+        self._sliding = self._at_nodes = SlidingContact.of(
             scene, decomposition.fixed, decomposition.comm, axes=decomposition.axes
         )
         self._places = scene.points
@@ -497,6 +501,10 @@ class MovingContact(Contact):
         sides = [side for pair in searched for side in (pair.slave, pair.master) if isinstance(side, Surface)]
         self._obstacles = [pair.master for pair in searched if isinstance(pair.master, MovingObstacle)]
         self._facet = min((_facet_size(scene, side) for side in sides), default=np.inf)
+
+    def put_inside(self, places: InFacets) -> None:
+        """Put points of pairs with obstacles inside facets of slaves, by key, all others at nodes."""
+        self._sliding = self._at_nodes.with_inside(places)
 
     def longest_part(self, first: Loading, last: Loading) -> float:
         """Return the part in which what nodes may pass moves by a few facets. Collective."""

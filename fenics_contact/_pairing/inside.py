@@ -285,14 +285,14 @@ class InsideOf:
         around.eliminate_zeros()
         needed = np.unique(around.indices)
         opened = np.zeros(len(slave.nodes))
-        opened[needed] = opened_at(*self._at_nodes(needed))
+        opened[needed] = opened_at(*self.at_nodes(needed))
         met = np.isfinite(opened)
         count = around @ met.astype(float)
         mean = around @ np.where(met, opened, 0.0) / np.maximum(count, 1.0)
         own = opened_at(facet, local)
         return np.where((count > 0.0) & np.isfinite(own), np.maximum(np.nan_to_num(own) - mean, 0.0), 0.0)
 
-    def _at_nodes(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def at_nodes(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return nodes, by their positions, as corners of facets: these and local coordinates."""
         first = np.zeros(len(self.slave.nodes), dtype=np.int64)
         first[self.slave.facets.ravel()] = np.arange(self.slave.facets.size)
@@ -308,7 +308,7 @@ class InsideOf:
         at_corners = slave.facets[facet]
         nodes, weights = (at_corners, values) if slave.whole is None else shape_weights(slave, facet, values)
         needed, place = np.unique(nodes, return_inverse=True)
-        at_nodes = gaps_at(*self._at_nodes(needed))[place.reshape(nodes.shape)]
+        at_nodes = gaps_at(*self.at_nodes(needed))[place.reshape(nodes.shape)]
         between = np.einsum("nk,nk->n", weights, np.where(weights != 0.0, at_nodes, 0.0))
         return np.asarray(between - gaps_at(facet, local))
 
@@ -355,21 +355,41 @@ class InFacets:
     @classmethod
     def of(cls, points: ContactPoints) -> InFacets:
         """Return those of contact points."""
-        which, width = points.are_inside, points.normal.shape[1] - 1
+        which = points.are_inside
         if points.slave_facet is None or points.slave_local is None:
-            return cls(which, which, np.zeros((0, width)), np.zeros(0))
+            return cls.none(points.normal.shape[1])
         relief = points.gap[which] - points.distance[which]
         return cls(which, points.slave_facet[which], points.slave_local[which], relief)
+
+    def by_key(self, points: ContactPoints) -> InFacets:
+        """Return them by the pairs and slave nodes of the points for their numbers."""
+        return replace(self, point=_keys(points)[self.point])
+
+    def by_number(self, points: ContactPoints) -> InFacets:
+        """Return those by key that are among points, by the numbers of these."""
+        _, here, number = np.intersect1d(self.point, _keys(points), return_indices=True)
+        return replace(self.part(here), point=number)
 
     def stored(self) -> dict[str, np.ndarray]:
         """Return the arrays from which they are found again, none without any points."""
         return {f"inside.{name}": getattr(self, name) for name in self._NAMES} if len(self.point) else {}
 
     @classmethod
-    def restored(cls, stored: Mapping[str, np.ndarray]) -> InFacets:
+    def restored(cls, stored: Mapping[str, np.ndarray], dim: int) -> InFacets:
         """Return those of `stored`."""
+        if "inside.point" not in stored:
+            return cls.none(dim)
+        return cls(*(stored[f"inside.{name}"] for name in cls._NAMES))
+
+    def are_those_of(self, other: InFacets) -> bool:
+        """Return whether both are the same."""
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in self._NAMES)
+
+    @classmethod
+    def none(cls, dim: int) -> InFacets:
+        """Return none in a space of a dimension."""
         nothing = np.zeros(0, dtype=np.int64)
-        return cls(*(stored.get(f"inside.{name}", nothing) for name in cls._NAMES))
+        return cls(nothing, nothing, np.zeros((0, dim - 1)), np.zeros(0))
 
     def part(self, chosen: np.ndarray) -> InFacets:
         """Return some of them, by indices or a mask."""
@@ -379,6 +399,10 @@ class InFacets:
     def join(cls, parts: Sequence[InFacets]) -> InFacets:
         """Return those of several groups, at least one."""
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls._NAMES))
+
+
+def _keys(points: ContactPoints) -> np.ndarray:
+    return np.asarray(points.pair * points.master.shape[1] + points.slave)
 
 
 def points_inside(

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -215,8 +215,21 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
         strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
         strung("axes"), strung("symmetric"), strung("distance"), strung("given"), taken,
         None if all(part.length is None for part in parts) else strung("sizes"),
-        _strung_planes(parts, dim), _strung_turns(parts, dim),
+        _strung_planes(parts, dim), _strung_turns(parts, dim), *_strung_inside(parts),
     )  # fmt: skip
+
+
+def _strung_inside(parts: Sequence[ContactPoints]) -> tuple[Any, ...]:
+    """Return where all points lie on their slaves, nothing where all lie at nodes."""
+    if all(part.are_at_nodes for part in parts):
+        return ()
+    facet, local = [], []
+    for part in parts:
+        count, width = part.local.shape
+        facet.append(np.full(count, -1) if part.slave_facet is None else part.slave_facet)
+        local.append(np.zeros((count, width)) if part.slave_local is None else part.slave_local)
+    own = sp.vstack([part.own for part in parts], format="csr")
+    return own, np.concatenate(facet), np.concatenate(local)
 
 
 def _strung_planes(parts: Sequence[ContactPoints], dim: int) -> np.ndarray | None:

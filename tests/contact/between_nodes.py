@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from fenics_contact import Body, ContactPair, RigidSphere, Scene, Support, Surface
+from fenics_contact import (
+    Body,
+    ContactPair,
+    MovingObstacle,
+    RigidSphere,
+    RigidTool,
+    Scene,
+    Support,
+    Surface,
+)
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.shapes import Triangulation
@@ -14,15 +24,31 @@ from fenics_contact.shapes import Triangulation
 RADIUS, DEPTH = 10.0, 0.01  # mm
 
 
-def pressed_on_disc(offset: float, cell: float = 1.0, *, rubber: bool = False, friction: Any = None) -> Scene:
+def pressed_on_disc(
+    offset: float, cell: float = 1.0, *, rubber: bool = False, friction: Any = None, material: Any = None
+) -> Scene:
     """Return a plate that is pressed onto a rigid disc, which meets it an offset beside a node, in cells."""
     layers = int(np.ceil(6.0 / cell))
     half = layers * cell
     mesh = rectangle((-half, 0.0), (half, 6.0), (2 * layers, layers))
     mesh = mesh.moved(mesh.points + np.array([offset * cell, 0.0]))
-    body = Body(mesh, NeoHooke(5.0, 0.4) if rubber else PlaneStrain(2.1e5, 0.3))
+    body = Body(mesh, material or (NeoHooke(5.0, 0.4) if rubber else PlaneStrain(2.1e5, 0.3)))
     pair = ContactPair(Surface("plate", "y0"), RigidSphere((0.0, -RADIUS), RADIUS), friction)
     return Scene({"plate": body}, [Support("plate", "y1", (0.0, -DEPTH))], contacts=[pair])
+
+
+def on_tool(scene: Scene) -> Scene:
+    """Return the scene on the same disc as a rigid tool."""
+    tool = RigidTool("disc", RigidSphere((0.0, -RADIUS), RADIUS), at=(0.0, -RADIUS))
+    return replace(scene, contacts=[replace(scene.contacts[0], master=tool)])
+
+
+def met_by_disc(scene: Scene) -> Scene:
+    """Return the scene in which the disc comes from below and moves as far into the plate."""
+    below = RigidSphere((0.0, -RADIUS - DEPTH), RADIUS)
+    disc = MovingObstacle(below, lambda time: (None, (0.0, 2.0 * DEPTH * time)))
+    pair = replace(scene.contacts[0], master=disc)
+    return replace(scene, supports=[Support("plate", "y1", (0.0, 0.0))], contacts=[pair])
 
 
 STEEL = IsotropicElasticity(2.1e5, 0.3)

@@ -13,6 +13,7 @@ from fenics_contact._base.checks import floats
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._pairing.inside import InFacets, InsideOf
 from fenics_contact._pairing.points import (
     ContactPoints,
     NodeNumbers,
@@ -115,6 +116,16 @@ class SlidingContact:
             meetings = with_given_offsets(meetings, origin, stood.points, fixed, comm)
         return cls(scene, fixed, comm, reach, meetings, axes)
 
+    def with_inside(self, places: InFacets) -> SlidingContact:
+        """Return the pairs with points inside facets of slaves on obstacles, by `SlidingPoints.key`."""
+        number, node = np.divmod(places.point, len(self.scene.points))
+        meetings = list(self.meetings)
+        for index in np.unique(number):
+            mine = number == index
+            inside = InsideOf.of(self.scene, self.scene.contacts[int(index)])
+            meetings[index] = meetings[index].with_inside(inside, replace(places, point=node).part(mine))
+        return replace(self, meetings=tuple(meetings))
+
     def at(
         self,
         coordinates: np.ndarray,
@@ -211,15 +222,15 @@ class SlidingContact:
         frame = self._frame(obstacle, coordinates, time)
         still = obstacle.obstacle if isinstance(obstacle, MovingObstacle) else obstacle
         shape = still if frame is None else placed(still, frame[0], floats(frame[1]))
-        place = coordinates[meeting.nodes]
+        place = meeting.own @ coordinates[meeting.slave_nodes]
         gap, normal = evaluate_shape(shape, "distance", place), evaluate_shape(shape, "normals", place)
         facing = np.einsum("nd,nd->n", meeting.normals(coordinates), normal) < 0
         chosen = np.flatnonzero(facing & (gap <= self.reach))
         curvature = evaluate_shape(shape, "curvatures", place[chosen])
         none = sp.csr_matrix((len(chosen), len(coordinates)))
         points = _points(meeting, chosen, normal[chosen], gap[chosen], none)
-        cut = meeting.slave.mirrored[meeting.candidates[chosen]]
-        points = with_symmetry(points, cut, meeting.slave.planes)
+        points = _where_they_lie(points, meeting, chosen)
+        points = with_symmetry(points, meeting.cut[chosen], meeting.slave.planes)
         return points, without_patches(curvature, len(coordinates))
 
     def _on_tool(
@@ -236,7 +247,7 @@ class SlidingContact:
         assert frame is not None
         turn, shift = frame
         nodes = NodeNumbers.of(self.scene).global_nodes(tool.name, np.arange(body.mesh.n_nodes))
-        foot = coordinates[points.slave] - points.distance[:, None] * points.normal
+        foot = points.own @ coordinates - points.distance[:, None] * points.normal
         slopes = points.tangents @ turn @ body.cell_slopes.T
         second = np.einsum("nad,nde,nbe->nab", points.tangents, differential.curvature, points.tangents)
         # At edges and corners, where a foot stays, r D has an eigenvalue of one.
@@ -306,6 +317,17 @@ def _points(
         np.zeros((count, normal.shape[1] - 1)), axes, np.zeros(normal.shape, dtype=bool), distance,
         meeting.given[chosen], taken,
     )  # fmt: skip
+
+
+def _where_they_lie(points: ContactPoints, meeting: Meeting, chosen: np.ndarray) -> ContactPoints:
+    """Return points of candidates that may lie inside facets of the slave."""
+    if (meeting.on_facet < 0).all():
+        return points
+    own = meeting.own[chosen].tocoo()
+    entries = own.data, (own.row, meeting.slave_nodes[own.col])
+    inside = sp.csr_matrix(entries, shape=points.master.shape)
+    facet, local = meeting.on_facet[chosen], meeting.on_local[chosen]
+    return replace(points, inside=inside, slave_facet=facet, slave_local=local)
 
 
 def _carried(weights: np.ndarray, nodes: np.ndarray, count: int) -> sp.csr_matrix:

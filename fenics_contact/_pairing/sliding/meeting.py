@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fenics_contact._base.libraries import MPI
+from fenics_contact._pairing.inside import ON_PLANE, InFacets, InsideOf
 from fenics_contact._pairing.points import PARALLEL, NodeNumbers, are_beside, tied_keys
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
 from fenics_contact._pairing.sliding.closest import ClosestPoints, Roles, moved_surface
@@ -47,6 +48,10 @@ class Meeting:
         reach: Distance beyond which no candidate needs a point, [length].
         roles: Which candidates are slaves, where a surface meets itself; None where all are.
         taken: Whose areas they have, too, see `ContactPoints.taken`.
+        own: Weights of the slave's nodes in where candidates lie, at their nodes at first, shape
+            (n_candidates, n_slave).
+        on_facet: The facet of the slave in which one lies, −1 at nodes, shape (n_candidates,).
+        on_local: Local coordinates on it, shape (n_candidates, dim − 1).
     """
 
     slave: FacetedSurface
@@ -55,6 +60,9 @@ class Meeting:
     offset: np.ndarray
     given: np.ndarray
     area: np.ndarray
+    own: sp.csr_matrix
+    on_facet: np.ndarray
+    on_local: np.ndarray
     patches: SmoothPatches | None
     facets: FacetedSurface | None
     master_nodes: np.ndarray
@@ -72,13 +80,27 @@ class Meeting:
 
     def part(self, chosen: np.ndarray) -> Meeting:
         """Return the pair with some of its candidates, by their positions; not of a body with itself."""
-        names = ("candidates", "offset", "given", "area")
+        names = ("candidates", "offset", "given", "area", "own", "on_facet", "on_local")
         taken = None if self.taken is None else self.taken[chosen]
         return replace(self, taken=taken, **{name: getattr(self, name)[chosen] for name in names})
 
     def normals(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the outward normals of the candidates as the bodies lie now, shape (n_candidates, dim)."""
-        return moved_surface(self.slave, coordinates[self.slave_nodes]).averaged[self.candidates]
+        return np.asarray(self.own @ moved_surface(self.slave, coordinates[self.slave_nodes]).averaged)
+
+    def with_inside(self, inside: InsideOf, places: InFacets) -> Meeting:
+        """Return the pair with some candidates, by their nodes, inside facets of the slave."""
+        at, own = np.searchsorted(self.nodes, places.point), self.own.tolil()
+        offset, on_facet, on_local = self.offset.copy(), self.on_facet.copy(), self.on_local.copy()
+        own[at] = inside.at(places.facet, places.local).own[:, self.slave_nodes]
+        offset[at] += places.relief
+        on_facet[at], on_local[at] = places.facet, places.local
+        return replace(self, offset=offset, own=own.tocsr(), on_facet=on_facet, on_local=on_local)
+
+    @property
+    def cut(self) -> np.ndarray:
+        """Planes of symmetry that cut the slave at candidates, shape (n_candidates, n_planes)."""
+        return np.asarray(abs(self.own) @ (~self.slave.mirrored).astype(float) < ON_PLANE)
 
     def closest(
         self,
@@ -208,7 +230,13 @@ def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray, tied: np.ndarra
     other = pair.master
     master = surface_of(scene, other, "faceted") if isinstance(other, Surface) else other
     candidates = np.flatnonzero(bearing & carrying(pair, slave, master))
-    own = np.zeros(len(candidates)), np.zeros(len(candidates), dtype=bool), slave.point_areas[candidates]
+    count = len(candidates)
+    at_nodes = np.ones(count), candidates, np.arange(count + 1)
+    own = (
+        np.zeros(count), np.zeros(count, dtype=bool), slave.point_areas[candidates],
+        sp.csr_matrix(at_nodes, shape=(count, len(slave.nodes))), np.full(count, -1),
+        np.zeros((count, dim - 1)),
+    )  # fmt: skip
     if not isinstance(master, FacetedSurface):
         none = np.zeros(0, dtype=np.int64), np.zeros((0, dim), dtype=bool)
         return Meeting(slave, slave_nodes, candidates, *own, None, None, *none, master)

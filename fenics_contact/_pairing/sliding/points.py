@@ -216,7 +216,7 @@ class SlidingPoints:
         between nodes and masters are at rest: what is carried along and turns with the masters.
         """
         points, weights = self.points, self.points.master
-        foot = self.coordinates[points.slave] - points.distance[:, None] * points.normal
+        foot = points.own @ self.coordinates - points.distance[:, None] * points.normal
         if elastic is not None:
             way = np.einsum("na,nad->nd", elastic, points.tangents)
             foot, weights = foot - way, weights - self._moving_by(way)
@@ -387,8 +387,7 @@ class SlidingPoints:
         at_node = np.ones(self.points.count)
         for mine, _ in self._by_means:
             at_node[mine] = 0.0
-        place = np.arange(self.points.count), self.points.slave
-        own = sp.csr_matrix((at_node, place), shape=self.points.master.shape)
+        own = scaled_rows(self.points.own, at_node)
         return (own + scaled_rows(self.points.master, 1.0 - at_node)).tocsr()
 
     @property

@@ -117,7 +117,7 @@ def slip_by_start(
     """
     count, nodes = points.count, len(coordinates)
     width, dim = points.tangents.shape[1:]
-    local, slaves = point_motion(start, differential).local, _of_nodes(start.slave, nodes)
+    local, slaves = point_motion(start, differential).local, start.own
     result = sp.csr_matrix((width * count, dim * nodes))
     for index, rotation in enumerate(turned):
         if rotation is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -156,6 +156,14 @@ class GeometricStiffness:
     blocks: np.ndarray
     block_node: np.ndarray
 
+    def joined(self, other: GeometricStiffness) -> GeometricStiffness:
+        """Return the sum of two, of different points, the other one without blocks of nodes."""
+        point = np.concatenate([self.point, other.point])
+        order = np.argsort(point, kind="stable")
+        columns = sp.hstack([self.columns, other.columns], format="csr")[:, order]
+        values = np.concatenate([self.values, other.values])[order]
+        return replace(self, columns=columns, values=values, point=point[order])
+
     def assembled(self) -> sp.csr_matrix:
         """Return K, shape (n_dofs, n_dofs)."""
         dim, size = self.blocks.shape[1], self.columns.shape[0]
@@ -163,6 +171,18 @@ class GeometricStiffness:
         row, column = np.repeat(dof, dim, axis=1).ravel(), np.tile(dof, dim).ravel()
         own = sp.csr_matrix((self.blocks.ravel(), (row, column)), shape=(size, size))
         return (self.columns @ sp.diags(self.values) @ self.columns.T + own).tocsr()
+
+
+def _between_nodes(points: ContactPoints, which: np.ndarray, blocks: np.ndarray) -> GeometricStiffness:
+    """Return the stiffness of blocks, shape (n, dim, dim), at points inside facets of their slaves."""
+    values, vectors = np.linalg.eigh(blocks)
+    dim, own = values.shape[1], points.own[which]
+    rows = spread(np.swapaxes(vectors, 1, 2).reshape(-1, dim), own[np.repeat(np.arange(len(which)), dim)])
+    length = np.sqrt(np.repeat(np.asarray(own.multiply(own).sum(axis=1)).ravel(), dim))
+    columns, found = scaled_rows(rows, 1.0 / length).T.tocsr(), values.ravel() * length**2
+    kept = np.abs(found) > LAST_PLACES * np.abs(found).max()
+    no_blocks = np.zeros((0, dim, dim)), np.zeros(0, dtype=np.int64)
+    return GeometricStiffness(columns[:, kept], found[kept], np.repeat(which, dim)[kept], *no_blocks)
 
 
 def geometric_stiffness(
@@ -182,6 +202,12 @@ def geometric_stiffness(
     bent = differential.curvature.any(axis=(1, 2))
     pushed = np.flatnonzero((multiplier > 0.0) & bent)
     blocks = -multiplier[pushed, None, None] * differential.curvature[pushed]
+    between = np.isin(pushed, points.are_inside)
+    if between.any():
+        own = _between_nodes(points, pushed[between], blocks[between])
+        others = multiplier.copy()
+        others[pushed[between]] = 0.0
+        return geometric_stiffness(points, differential, others).joined(own)
     if len(pressed) == 0:
         nothing = sp.csr_matrix((points.normal.shape[1] * points.jump.shape[1], 0))
         return GeometricStiffness(nothing, np.zeros(0), pressed, blocks, points.slave[pushed])
