@@ -34,7 +34,7 @@ def sharp_nodes(mesh: BodyMesh, name: str, cuts: np.ndarray) -> np.ndarray:
     return known[key]
 
 
-def facing_area(mesh: BodyMesh, name: str, axisymmetric: bool, share: float = 0.2) -> np.ndarray:
+def facing_area(mesh: BodyMesh, name: str, axisymmetric: bool, share: float = 0.05) -> np.ndarray:
     """Return the area of each node of a surface, ascending, that is enough to face a master, shape (n,).
 
     It is that of the mesh before any design moved it.

@@ -14,11 +14,14 @@ from fenics_contact import (
     Body,
     BodyMesh,
     ContactPair,
+    ContactProblem,
+    LoadStep,
     Scene,
     State,
     Support,
     Surface,
     solve_scene,
+    solve_steps,
 )
 from fenics_contact._pairing.mortar.coupling import mortar_coupling
 from fenics_contact.gallery import block, rectangle
@@ -213,6 +216,26 @@ def test_a_sharp_ring_presses_along_the_axis(strain: str) -> None:
         forces[kind] = contact.normal_force @ contact.points.normal
     assert forces["node"][1] > 10.0
     require_upright(forces["mortar"], float(forces["node"][1]))
+
+
+def test_a_tip_slides_along_a_floor_and_over_its_edge_as_by_nodes() -> None:
+    """Its last hundredth on the floor included; beyond the edge, at 0.4, nothing presses."""
+    floor = rectangle((-2, -1), (0.4, 0), (10, 4))
+    bar = turned_in_plane(rectangle((0, 0), (1, 2), (5, 10)), TURN, ("y0", "x0"))
+    bodies = {"floor": Body(floor, MATERIALS["large"]), "bar": Body(bar, MATERIALS["large"])}
+    steps = [
+        LoadStep(f"{x}", supports=[Support("floor", "y0"), Support("bar", "y1", (x, -0.05))])
+        for x in (0.3, 0.36, 0.39, 0.5)
+    ]
+    forces = []
+    for kind in ("node", "mortar"):
+        pair = ContactPair(Surface("bar", "under"), Surface("floor", "y1"), discretisation=kind)  # type: ignore[arg-type]
+        problem = ContactProblem(Scene(bodies, steps[0].supports, contacts=[pair]), MPI.COMM_SELF)
+        forces.append([np.linalg.norm(force_on(state)) for state in solve_steps(problem, steps)])
+    by_nodes, by_mortar = np.array(forces)
+    assert by_nodes[2] > 5.0
+    np.testing.assert_allclose(by_mortar, by_nodes, rtol=0.03, atol=1e-6)
+    assert by_mortar[-1] < 1e-6
 
 
 def test_an_edge_of_which_hardly_a_part_faces_the_master_keeps_its_normal() -> None:
