@@ -28,7 +28,7 @@ class Residuals:
         natural: ‖λ − P_Λ(λ − ρ r)‖ over the contact rows, relative to ‖λ_N‖.
         gluing: ‖r‖ over the equality rows, relative to the displacements that cancel there,
             max(‖(F λ − d)_E‖, ‖d_E‖), or, for a final solution, to the displacements themselves if they are
-            smaller; where hardly anything cancels, the force that would close the jumps, relative to ‖λ‖.
+            smaller.
         coarse: Distance of λ from equilibrium, ‖Gᵀ(G Gᵀ)⁻¹(G λ − e)‖, relative to ‖λ‖.
         violation: Largest violation of a bound or disc, relative to ‖λ_N‖.
         force_scale: The force by which `natural` and `violation` were divided.
@@ -159,32 +159,14 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
         distance_idle if distance_idle > max(rounding, LAST_PLACES * stiff * load) else 0.0,
     )
     violation = global_max(problem.comm, feasible.violation(multiplier))
-    gluing = _ratio(jump if jump > LAST_PLACES * max(load, pressed) else 0.0, gluing_scale)
     return Residuals(
         natural=_ratio(distance, force_scale),
-        gluing=_or_by_force(gluing, problem, residual, everything),
+        gluing=_ratio(jump if jump > LAST_PLACES * max(load, pressed) else 0.0, gluing_scale),
         coarse=_ratio(unbalanced, max(everything, loads, least.everything)),
         violation=_ratio(violation if violation > rounding else 0.0, force_scale),
         force_scale=force_scale,
         gluing_scale=gluing_scale,
     )
-
-
-def _or_by_force(
-    gluing: float, problem: DualProblem, residual: Vector, everything: float, large: float = 0.01
-) -> float:
-    """Return the residual of gluing, or the force that closes its jumps relative to all. Collective.
-
-    Where supports and gluing have nothing to cancel, as where a body deforms along none of its supports,
-    jumps relative to what cancels are 1 however small they are. The smaller of both counts. The force costs
-    an application of the preconditioner and is found for residuals above `large` alone.
-    """
-    if gluing <= large or problem.preconditioner is None:
-        return gluing
-    rows, jumps = problem.layout.equality, np.zeros_like(residual)
-    jumps[rows] = residual[rows]
-    force = global_sum(problem.comm, _square(problem.preconditioner(jumps)[rows]))
-    return min(gluing, _ratio(float(np.sqrt(force[0])), everything))
 
 
 def _square(x: Vector) -> float:

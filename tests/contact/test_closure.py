@@ -20,12 +20,10 @@ from fenics_contact import (
     LinearClosure,
     LoadStep,
     NewtonSteps,
-    RigidPlane,
     Scene,
     State,
     Support,
     Surface,
-    TotalForce,
     Traction,
     solve_scene,
 )
@@ -33,7 +31,6 @@ from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, NeoHooke
-from fenics_contact.qp import FaceNewton
 from tests.contact.law_cases import CLOSURES, FLOOR, MODULUS, pressed_block, solved, tilted_block
 
 
@@ -222,39 +219,3 @@ def test_rubber_that_moves_far_follows_the_law_by_undeformed_areas(
     np.testing.assert_allclose(state.contact.gap, law.reach - law.closure(pressure), atol=1e-7)
     assert NewtonSteps.of([state]).reduction.max() < 1e-2, "tangents are exact"
     assert state.energies.surface > 0.0
-
-
-def _on_springs(x: np.ndarray, springs: np.ndarray, force: float, moment: float) -> np.ndarray:
-    """Return the forces of one-sided springs under a rigid beam, (n,), by those that press."""
-    pressing = np.ones(len(x), dtype=bool)
-    while True:
-        arms = np.column_stack([np.ones_like(x), x])[pressing]
-        sunk, turned = np.linalg.solve(arms.T @ (springs[pressing, None] * arms), [force, moment])
-        forces = springs * (sunk + turned * x)
-        if np.array_equal(pressing, forces > 0.0):
-            return np.maximum(forces, 0.0)
-        pressing = forces > 0.0
-
-
-def test_a_stiff_footing_tips_on_a_soft_bed_as_a_rigid_one_on_springs() -> None:
-    """It deforms along none of its supports: jumps there are compared with forces, not with nothing."""
-    width, eccentricity, force, stiffness = 6.0, 1.5, 900.0, 1e3
-    mesh = block((-width / 2, 0, 0), (width / 2, 1, 2), (6, 1, 2))
-    bed = ContactPair(
-        Surface("footing", "z0"),
-        RigidPlane((0, 0, 0), (0, 0, 1)),
-        Coulomb(0.2),
-        closure=LinearClosure(stiffness),
-    )
-    load = TotalForce("footing", "z1", (0, 0, -force), moment=(0, force * eccentricity, 0))
-    footing = Body(mesh, IsotropicElasticity(1e9, 0.0))
-    scene = Scene(
-        {"footing": footing}, [Support("footing", "y0", (None, 0, None))], loads=[load], contacts=[bed]
-    )
-    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6, solver=FaceNewton(max_products=200))
-    x = np.linspace(-width / 2, width / 2, 7)
-    springs = stiffness * np.array([0.5, 1, 1, 1, 1, 1, 0.5])
-    exact = _on_springs(x, springs, force, force * eccentricity) / springs * stiffness
-    assert np.count_nonzero(exact) < len(x)
-    assert state.contact.pressure.max() == pytest.approx(exact.max(), rel=1e-5)
-    assert state.contact.normal_force.sum() == pytest.approx(force, rel=1e-6)
