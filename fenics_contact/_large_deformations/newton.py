@@ -120,15 +120,17 @@ class TangentNewton:
         patience: Steps in which the residual must halve; else this care begins, and from the second time on
             the natural map becomes more cautious.
         caution: Factor on ρ of the natural map then.
-        stalls: How often that may happen while the residual is above `near`.
+        stalls: How often that may happen while the residual is above `near`,
+        softening_stalls: and where it is not half of the first one, while stress has softened more motions
+            than at the start: no equilibrium is near then.
         room: Part of the smallest det F that a step must leave.
         near: Residual below which a first step without progress is reason enough for care.
         least_care: Least factor by care, so that linear systems are not solved beyond rounding.
         fine: Residual of a linear system that is always small enough, relative to `tolerance`.
         hidden: Errors at contact below this part of the forces out of balance do not shorten a step: they do
             not depend on the active set then.
-        enough: Part of all residuals to which a whole step must reduce them where forces move rigid surfaces:
-            as supports do that are moved, they begin with contact in order and forces out of balance.
+        enough: Part of all residuals to which a whole step must reduce them to be taken though contact gets
+            worse: loads begin with contact in order and forces out of balance.
         slipped: Part of the slip bound within which a disc counts as slipping at the start of a load step:
             what slipped in the last one mostly goes on.
         nested: Tolerance of contact problems that are solved as a whole, at the start of a history.
@@ -151,6 +153,7 @@ class TangentNewton:
     patience: int = 4
     caution: float = 0.2
     stalls: int = 4
+    softening_stalls: int = 2
     room: float = 0.2
     near: float = 1e-2
     least_care: float = 1e-3
@@ -176,7 +179,7 @@ class TangentNewton:
                     f"{name} of TangentNewton must lie between 0 and 1, got {getattr(self, name)!r}: it is a "
                     f"ratio, by default {getattr(TangentNewton, name)}"
                 )
-        for name in ("max_steps", "max_products", "patience", "stalls", "rescues", "few"):
+        for name in ("max_steps", "max_products", "patience", "stalls", "softening_stalls", "rescues", "few"):
             check_count(getattr(self, name), f"{name} of TangentNewton")
 
     def solve(
@@ -237,6 +240,14 @@ class _Pace:
         return _Pace(forcing, (worst,), care, caution, self.stalls + 1)
 
 
+@dataclass(frozen=True)
+class _Begin:
+    """Where a load step began: its first residual, and how many motions the first tangent had softened."""
+
+    worst: float
+    softened: int = 0
+
+
 @dataclass(frozen=True, eq=False)
 class _State:
     """The data passed from one Newton step to the next."""
@@ -244,6 +255,7 @@ class _State:
     evaluation: ResidualState
     near: Linearisation | None  # the last one, None before the first
     pace: _Pace  # that of the last step
+    begin: _Begin
     before: Residuals | None = None  # before the last step
     instead: Configuration | None = None  # where to start from if the first step fails
     loose: bool = False  # whether the last face did not hold every body
@@ -253,6 +265,17 @@ class _State:
     def history(self) -> tuple[SolverStep, ...]:
         """One line for each step."""
         return self.effort.history
+
+    def is_vain(self, method: TangentNewton) -> bool:
+        """Return whether further steps are vain: residuals do not fall, or bodies lose stability meanwhile.
+
+        So they do where no equilibrium is near; where one is, more motions are stable as it is approached.
+        """
+        worst, stalls = self.evaluation.residuals.worst, self.pace.stalls
+        if worst <= method.near or self.near is None:
+            return False
+        softening = self.near.system.softened > self.begin.softened and worst > 0.5 * self.begin.worst
+        return stalls >= method.stalls or (stalls >= method.softening_stalls and softening)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +291,8 @@ class _Run:
         """Return the state before the first step. Collective."""
         evaluation, instead = starts(self._started, start, moved)
         first = evaluation.residuals
-        state = _State(evaluation, known, _Pace(self.method.forcing), instead=instead)
+        begin = _Begin(first.worst)
+        state = _State(evaluation, known, _Pace(self.method.forcing), begin, instead=instead)
         if known is None and first.force_scale > 0.0 and first.within(self.method.tolerance):
             # Gaps are measured by the diagonal of F, which is known only now.
             near = evaluation.linearised(self.timer, None)
@@ -282,8 +306,7 @@ class _Run:
         residuals, method, history = state.evaluation.residuals, self.method, state.history
         if state.near is not None and residuals.within(method.tolerance):
             return NonlinearEquilibrium(state.evaluation, state.near, state.effort)
-        vain = state.pace.stalls >= method.stalls and residuals.worst > method.near
-        if vain or len(history) >= method.max_steps or not residuals.worst < 1e6:
+        if state.is_vain(method) or len(history) >= method.max_steps or not residuals.worst < 1e6:
             raise ConvergenceError(
                 f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
                 f"{counted(len(history), 'step')}: {history[-1] if history else 'no step'}: "
@@ -301,7 +324,8 @@ class _Run:
             state.near.release_factors()
         near = state.evaluation.linearised(self.timer, state.near)
         evaluation = near.of(state.evaluation)
-        state = replace(state, evaluation=evaluation, near=near, pace=pace)
+        begin = state.begin if state.history else replace(state.begin, softened=near.system.softened)
+        state = replace(state, evaluation=evaluation, near=near, pace=pace, begin=begin)
         # (b), (c) The face and its linear system.
         with self.timer.phase("solve"):
             taken, near, whole = self._solved(state)
@@ -429,7 +453,7 @@ class _Run:
         full, before, method = after(1.0), start.residuals, self.method
         if full.residuals.natural <= max(before.natural, method.hidden * full.residuals.coarse):
             return Damped(full, longest)
-        if start.load.is_tracked and full.residuals.worst <= method.enough * before.worst:
+        if full.residuals.worst <= method.enough * before.worst:
             return Damped(full, longest)
         earlier = (None if old is None else old.at_rows for old in (before, state.before))
         found = damp(full, after, lambda each: each.residuals.at_rows, earlier)
