@@ -52,7 +52,10 @@ def check_held(torn: TornSystem) -> None:
             _check_balance(torn, [bodies[index] for index in floating], loads[floating])
 
 
-def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray) -> None:
+def _check_balance(
+    torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray, largest: float = 1e7
+) -> None:
+    """Reject loads that nothing balances; `largest`: bounds relative to them that are as if infinite."""
     scale = float(np.abs(loads).max())
     if scale == 0.0:
         return
@@ -60,7 +63,7 @@ def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray)
     tied, along = _of_ties(torn, bodies)
     reactions, right = sp.hstack([support, tied]), -loads.ravel() / scale
     contact = sp.vstack([body.contact_wrenches(torn) for body in bodies])
-    bound = torn.tresca_bound / scale
+    bound = np.minimum(torn.tresca_bound / scale, largest)
     balance = _Balance(torn, reactions, contact, right, bound)
     left = balance.left(1.0 - MARGIN)
     if left is None:

@@ -173,6 +173,18 @@ def test_the_limit_of_friction_does_not_depend_on_the_units(
     refused(in_units(pulled(scene, "block", (1.002 * 0.3, 0.0, -1.0)), length, force))
 
 
+def test_a_load_that_is_nothing_beside_the_bound_of_friction_is_held() -> None:
+    """Loads that are taken off by tenths leave 1e-16 of what they were."""
+    lower, upper = rectangle((0.0, 0.0), (2.0, 1.0), (3, 1)), rectangle((0.0, 1.0), (2.0, 1.8), (2, 1))
+    bodies = {"low": Body(lower, PlaneStrain(1.0, 0.3)), "up": Body(upper, PlaneStrain(1.0, 0.3))}
+    pair = ContactPair(Surface("up", "y0"), Surface("low", "y1"), Tresca(0.05))
+    load = 0.02 * abs(1.0 - sum([0.1] * 10))
+    scene = Scene(bodies, [Support("low", "y0")], [TotalForce("up", "y1", (0.0, -load))], contacts=[pair])
+    state = solve_scene(scene, MPI.COMM_SELF)
+    assert 0.0 < load < 1e-17
+    assert state.contact.force[:, 1].sum() == pytest.approx(load, rel=1e-9)
+
+
 def test_a_body_at_the_very_limit_of_friction_is_refused_as_any_slide_is_an_answer() -> None:
     scene = pulled(block_on_plane(Coulomb(0.3)), "block", (0.3, 0.0, -1.0))
     with pytest.raises(InfeasibleError, match="'block' is held only just: the load uses up all friction"):
