@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fenics_contact._base.display import displayed
-from fenics_contact._equilibrium.starts import CoarseStart, put_contact
+from fenics_contact._equilibrium.starts import CoarseStart
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.torn import TornSystem
@@ -92,6 +92,4 @@ class CarriedState:
 
     def multiplier(self, torn: TornSystem) -> np.ndarray:
         """Return forces at contact, owned, zero on all other rows: as a start, and for elastic slip."""
-        found = np.zeros(len(torn.numbering.owned))
-        put_contact(torn, found, *self.fields.contact_forces(torn))
-        return found
+        return self.fields.at_contact(torn)

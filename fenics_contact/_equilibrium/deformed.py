@@ -11,7 +11,7 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes_on_obstacles, with_places
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.other_rows import prescribed_as_is
-from fenics_contact._equilibrium.starts import carried_over
+from fenics_contact._equilibrium.starts import CoarseStart, carried_over
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
     require_resisted,
@@ -22,7 +22,7 @@ from fenics_contact._equilibrium.stored import Stored, require_rows, with_stored
 from fenics_contact._equilibrium.warnings import advice
 from fenics_contact._fem.mechanics import History
 from fenics_contact._large_deformations.equations import Configuration, Equations, ResidualState
-from fenics_contact._large_deformations.load_steps import AutomaticSteps, Path, PathEndsError, Snap
+from fenics_contact._large_deformations.load_steps import AutomaticSteps, Near, Path, PathEndsError, Snap
 from fenics_contact._large_deformations.loading import Loading
 from fenics_contact._large_deformations.moving_contact import Contact, ContactConfiguration, MovingContact
 from fenics_contact._large_deformations.newton import Effort, NonlinearEquilibrium, NotHeldError
@@ -32,7 +32,7 @@ from fenics_contact._scene.local_axes import free_part
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact._scene.tools import ToolBody
-from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError
+from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
 from fenics_contact.feti.averages import nodal_mean_transposed, nodal_sum
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.preloads import shortening_columns, shortening_scales
@@ -79,6 +79,7 @@ class DeformedEquilibria:
         step: LoadStep | None = None,
         *,
         overlap: bool = False,
+        start: State | CoarseStart | None = None,
         most: int = 4,
     ) -> DeformedState:
         """Compute the equilibrium of a scene. Collective.
@@ -91,7 +92,7 @@ class DeformedEquilibria:
             if places is None:
                 break
             self._put_inside(places)
-            state = self._solve(scene, before, tolerance, time, step, overlap=overlap)
+            state = self._solve(scene, before, tolerance, time, step, overlap=overlap, start=start)
             found = inside.after(state, needed_nodes_on_obstacles(state))
             places = None if found is None else found.by_key(state.contact.points)
         return state
@@ -110,6 +111,7 @@ class DeformedEquilibria:
         step: LoadStep | None,
         *,
         overlap: bool,
+        start: State | CoarseStart | None,
     ) -> DeformedState:
         steps = self._steps
         if tolerance is not None:
@@ -120,32 +122,35 @@ class DeformedEquilibria:
                 )
             steps = replace(steps, newton=replace(steps.newton, tolerance=tolerance))
         equations, timer = self._equations, self._timer
-        acted, start, known = None, equations.at_rest(), None
+        acted, begin, known = None, equations.at_rest(), None
         with timer.phase("assemble"):
             if isinstance(before, CarriedState):
-                acted, start = self._on_meshes_of(scene, before)
+                acted, begin = self._on_meshes_of(scene, before)
                 before = before.state
             elif isinstance(before, DeformedState):
                 acted, known = before.load, before.equilibrium.linearisation
-                start = before.equilibrium.configuration
+                begin = before.equilibrium.configuration
                 same = before.torn.decomposition is self.decomposition
                 same = same and self._places.are_those_of(_places_of(before, scene.dim))
                 if not (same and contacts_alike(scene, before.scene)):
-                    (acted, start), known = self._held_otherwise(scene, before), None
-        self._require_later(scene, start.time, time)
+                    (acted, begin), known = self._held_otherwise(scene, before), None
+        self._require_later(scene, begin.time, time)
         with timer.phase("assemble"):
             load = self._loading(scene, time, step, overlap)
             if isinstance(before, DeformedState) and acted is not None:
                 if scene.preloads:
                     acted = drawn_as(before, acted, load)
-                acted, load = moved_as(start, acted, load, equations.contact)
+                acted, load = moved_as(begin, acted, load, equations.contact)
             if acted is None:
                 check_held(load.torn)
             if self._unresisted is None:  # supports stay what they are in later steps
                 self._unresisted = unresisted_motions(load.torn)
             require_resisted(self._unresisted, load.torn, load.prescribed)
         try:
-            path = steps.follow(equations, acted, load, start, timer, known, held=not self._unresisted)
+            near = self._near(load, start) if before is None else None
+            path = steps.follow(
+                equations, acted, load, begin, timer, known, held=not self._unresisted, near=near
+            )
         except (InfeasibleError, NotHeldError) as failure:
             if not self._unresisted:
                 _require_more_than_springs(load.torn, failure)
@@ -159,6 +164,28 @@ class DeformedEquilibria:
             words = f"{where}{failure}{hints}"
             raise LoadStepError(words, failure.history, last) from failure
         return _state_after(path, before, timer, steps)
+
+    def _near(self, load: Loading, coarse: State | CoarseStart | None) -> Near | None:
+        """Return how Newton's method begins on refined meshes; None where equilibria depend on the way there.
+
+        Rigid surfaces turn along their arcs, fluid goes on, and slip begins where nodes are first found.
+        """
+        steps = self._steps
+        by_way = load.turned or any(pair.fluid is not None for pair in load.torn.scene.contacts)
+        if not isinstance(coarse, CoarseStart) or by_way or steps.snaps or steps.finer_history:
+            return None
+
+        def near(load: Loading, at: Configuration) -> Configuration:
+            moved, contact = coarse.displacement(load.torn), at.contact
+            assert contact is not None
+            there = self._equations.contact.at(load, moved, replace(contact, points=None))
+            if there.start is not contact.start:
+                raise ConvergenceError("nodes are first found on the way")
+            forces = coarse.at_contact(there.torn)
+            found = replace(at, displacement=moved, multiplier=forces, contact=there)
+            return _balanced(self._equations.evaluate_at(load, found))
+
+        return near
 
     def serves(self, scene: Scene, decomposition: Decomposition) -> bool:
         """Return whether a scene has the meshes, the held components and the contact pairs of these."""

@@ -503,7 +503,8 @@ class ContactProblem:
         Args:
             scene: The scene with other loads, values of supports or coordinates; None: the original one.
             start: State of a neighbouring geometry or load whose forces are the first guess, by default the
-                last one; None for ``before``. Nonlinear materials start from ``before``.
+                last one; None for ``before``. Nonlinear materials start from ``before``, or
+                with ``refinements`` in the first step from here.
             before: State at the end of the load step before, from which slip is measured and histories of
                 materials go on, also one on other meshes, see `CarriedState`; None: the undeformed bodies.
             tolerance: Overrides the problem's tolerance.
@@ -548,15 +549,17 @@ class ContactProblem:
             scene = replace(scene, preloads=held_at(scene, _lengths_after(last, scene)))
         kind = self._kind(scene, sensitivity=design or adjoint)
         _dolfinx.warn_if_untested(self.comm.rank)  # once PETSc has started on the ranks that solve
+        first = (self.state if start == "last" else start) or (last if last is before else None)
         with one_thread(self.comm):
             if kind is SolverKind.TANGENT_NEWTON:
                 self._require_no_dual_solver()
+                with together(self.comm):
+                    near = None if refinements is None else checked_start(scene, first, refinements)
                 state: AnyState = self._deformed(scene).solve(
-                    scene, before, wanted, time, step, overlap=design or refinements is not None
+                    scene, before, wanted, time, step, overlap=design or refinements is not None, start=near
                 )
             else:
                 check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
-                first = (self.state if start == "last" else start) or (last if last is before else None)
                 with together(self.comm):
                     guess = checked_start(scene, first, refinements)
                 known = self._alike(scene, first if guess is first else None)

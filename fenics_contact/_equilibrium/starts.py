@@ -225,9 +225,7 @@ class CoarseStart:
     def multiplier(self, system: DualSystem) -> np.ndarray:
         """Return the first guess on the rows of a system, owned; about one product. Collective."""
         torn, problem = system.torn, system.problem
-        moved = self.displacement(torn)
-        start = np.zeros(len(torn.numbering.owned))
-        put_contact(torn, start, *self.contact_forces(torn))
+        moved, start = self.displacement(torn), self.at_contact(torn)
         glued = torn.numbering.owned < torn.n_equality
         if torn.give is not None:
             soft = torn.give > 0.0
@@ -250,6 +248,12 @@ class CoarseStart:
             [self._to_fine(scene, name, self.state.gather_displacement(name)) for name in scene.body_names]
         )
         return at_copies(torn.decomposition, nodal)
+
+    def at_contact(self, torn: TornSystem) -> np.ndarray:
+        """Return forces at contact, owned, zero on all other rows. Collective."""
+        found = np.zeros(len(torn.numbering.owned))
+        put_contact(torn, found, *self.contact_forces(torn))
+        return found
 
     def contact_forces(self, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
         """Return normal forces, (n,), and friction in space, (n, dim), of interpolated tractions."""

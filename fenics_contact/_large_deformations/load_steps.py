@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -39,6 +39,9 @@ from fenics_contact.qp.solution import SolverStep
 if TYPE_CHECKING:
     from fenics_contact._pairing.sliding.slip import MaterialPoints
 
+
+#: Returns a configuration near the equilibrium at a load, from the one where its load step begins.
+Near: TypeAlias = Callable[[Loading, Configuration], Configuration]
 
 _LOG = logging.getLogger(__name__)
 NO_EFFORT = Effort()
@@ -278,6 +281,7 @@ class AutomaticSteps:
         known: Linearisation | None = None,
         *,
         held: bool = True,
+        near: Near | None = None,
     ) -> Path:
         """Return the equilibrium at a load, with the path to it. Collective.
 
@@ -289,6 +293,7 @@ class AutomaticSteps:
             timer: Collects the wall time.
             known: A linearisation near the start, or None.
             held: Whether supports and contacts resist every motion of the bodies at rest.
+            near: Finds where Newton's method tries to begin at the whole load, before the load is followed.
 
         Raises:
             PathEndsError: The smallest step fails.
@@ -301,6 +306,8 @@ class AutomaticSteps:
         assert at.contact is not None
         way = _Way(self, equations, first, target, at.contact, timer)
         now = Progress(at, first.torn, known, (at, first.torn), at.contact.start)
+        if near is not None:
+            now = way.from_near(now, near)
         with _Parts() as parts:
             return way.path(self._followed(way, now, parts, held=held))
 
@@ -431,6 +438,16 @@ class _Way:
         finer = self.steps.finer_history
         since = now.reached if finer else now.since
         return now.costing(found.effort).reaching(fraction, found, since, anew=False, ends=finer), None
+
+    def from_near(self, now: Progress, near: Near) -> Progress:
+        """Return the progress at the whole load from near its end; none where that fails. Collective."""
+        load = self._load(1.0, *now.origin)
+        try:
+            found = self.steps.newton.solve(self.equations, load, near(load, now.at), self.timer, None)
+        except ConvergenceError as failure:
+            safe_log(_LOG.info, "the start from coarser meshes led nowhere: %s", failure)
+            return now.costing(Effort.until(failure))
+        return now.costing(found.effort).reaching(1.0, found, now.since, anew=False, ends=False)
 
     def snapped(self, now: Progress, fraction: float, part: float, failure: ConvergenceError) -> Progress:
         """Return the progress after bodies have snapped where a part of the load fails. Collective."""
