@@ -57,7 +57,7 @@ def coarse() -> DeformedState:
 def test_rubber_on_refined_meshes_has_the_state_of_a_solve_from_rest(coarse: DeformedState) -> None:
     found = finer(coarse.scene)
     cold, warm = solved(found.scene), solved(found.scene, start=coarse, refinements=found.refinements)
-    assert warm.solution.products < 0.5 * cold.solution.products
+    assert warm.solution.products < 0.7 * cold.solution.products
     moved, slip = (np.abs(each).max() for each in (cold.torn_displacement, cold.contact.slip))
     assert warm.torn_displacement == pytest.approx(cold.torn_displacement, abs=1e-6 * moved)
     assert warm.contact.slip == pytest.approx(cold.contact.slip, abs=1e-6 * slip)

@@ -54,7 +54,7 @@ def test_an_overloaded_pad_gives_up_attempts_in_vain_and_reports_them(
     attempts = [history[i:j] for i, j in pairwise(starts)]
     vain = [len(each) for each in attempts if each[-1].residuals.worst > 1e-2]
     assert len(vain) > 2
-    assert max(vain) <= 18
+    assert max(vain) <= 20
     assert min(vain) <= 9
     told = [each for each in events if each.what == "load step in parts"]
     reached = re.search(r"up to (0\.\d+) of", str(error.value))
