@@ -249,8 +249,8 @@ class TornSystem:
         Elastic slip springs back: it is part of the next step's, whose friction begins as it is. What sticks
         has not slipped: its jumps are errors of the solver, and forces of a later step would follow them.
 
-        `displacement`: torn, of this rank, shape (torn_size,), [length]; `multiplier`: λ, owned; `sticks`:
-        marks of the rows of points that are known to stick, owned.
+        `displacement`: torn, of this rank, shape (torn_size,), [length]; `multiplier`: λ, owned. Rows of
+        points that are known to stick are marked, owned.
         """
         relative, compliance = self.relative(displacement), self.compliance
         if compliance is not None:

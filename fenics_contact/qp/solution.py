@@ -318,7 +318,7 @@ class Iterate:
 
     def motions(self, problem: DualProblem) -> Vector:
         """Return the α of r = F λ − d − Gᵀα, shape (m,), replicated. Collective."""
-        return problem.coarse.fitted(self.product - problem.rhs - self.residual)
+        return problem.coarse.coefficients(self.product - problem.rhs - self.residual)
 
 
 @dataclass(frozen=True, eq=False)
