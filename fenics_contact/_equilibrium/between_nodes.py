@@ -220,9 +220,12 @@ class InsideFacets:
     That is an open node, else the one that presses least; if it lies in the master then, its row comes back.
     """
 
-    def __init__(self, dim: int) -> None:
-        """Start with all points at their nodes."""
-        self._stay = InFacets.none(dim)
+    def __init__(self, dim: int, *, on_the_way: bool = False) -> None:
+        """Start with all points at their nodes.
+
+        `on_the_way`: whether bodies are in a later load step, where points decide which way they go on.
+        """
+        self._stay, self._on_the_way = InFacets.none(dim), on_the_way
 
     def after(self, state: State, needed_nodes: np.ndarray) -> InFacets | None:
         """Return other places than those of a state, None where it misses nothing more. Collective.
@@ -247,16 +250,16 @@ class InsideFacets:
             return None
         return places
 
-    @staticmethod
-    def _is_found(state: State, number: int) -> bool:
+    def _is_found(self, state: State, number: int) -> bool:
         """Return whether nodes find a contact: where more of them press than a facet has, facets do not.
 
-        Between two bodies one node or mean is enough; nonlinear ones have points on each other at nodes.
+        Between two bodies, and on the way, one node or mean is enough. Nonlinear bodies have points on each
+        other at nodes.
         """
         pressing = np.count_nonzero(state.contact.normal_force[state.contact.on_pair(number)] > 0.0)
-        if not isinstance(state.scene.contacts[number].master, Surface):
-            return bool(pressing > 2 ** (state.scene.dim - 1))
-        return bool(pressing > 0) or not isinstance(state, LinearState)
+        on_obstacle = not isinstance(state.scene.contacts[number].master, Surface)
+        enough = 2 ** (state.scene.dim - 1) if on_obstacle and not self._on_the_way else 0
+        return bool(pressing > enough) or not (on_obstacle or isinstance(state, LinearState))
 
 
 def _pressing(state: State, missed: Missed, busy: np.ndarray) -> InFacets:
@@ -333,6 +336,8 @@ def needed_nodes_on_obstacles(state: State) -> np.ndarray:
         displaced = _displaced(state, inside, mine)
         at = inside.at_nodes(np.searchsorted(inside.nodes, points.slave[mine]))
         gap, before = inside.at(*at).gap(displaced), undeformed.at(*at).distance
+        met = np.isfinite(gap) & np.isfinite(before)
+        mine, gap, before = mine[met], gap[met], before[met]
         needed.append(mine[gap < -SHARE * np.abs(gap - before)])
     return np.concatenate(needed)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import astuple, replace
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,7 @@ from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import nodal_mean_transposed, nodal_sum
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.preloads import shortening_columns, shortening_scales
@@ -48,6 +50,9 @@ from fenics_contact.results.state import Energies, State, Tolerance, softened
 
 if TYPE_CHECKING:
     from fenics_contact._pairing.sliding.slip import MaterialPoints
+
+
+_LOG = logging.getLogger(__name__)
 
 
 class DeformedEquilibria:
@@ -86,15 +91,27 @@ class DeformedEquilibria:
 
         `most`: how often other points are looked for, inside facets that are pierced between their nodes.
         """
-        places: InFacets | None = _places_of(before, scene.dim)
-        inside = InsideFacets(scene.dim)
-        for _ in range(1 + (0 if overlap else most)):
-            if places is None:
+        at_nodes = InFacets.none(scene.dim)
+        tried = [_places_of(before, scene.dim)]
+        inside = InsideFacets(scene.dim, on_the_way=before is not None)
+        state: DeformedState | None = None
+        while len(tried) <= 1 + (0 if overlap else most):
+            self._put_inside(tried[-1])
+            try:
+                state = self._solve(scene, before, tolerance, time, step, overlap=overlap, start=start)
+            except LoadStepError as failure:
+                if not len(tried[-1].point):
+                    raise
+                safe_log(_LOG.info, "points inside facets have no equilibrium near: %s", failure)
                 break
-            self._put_inside(places)
-            state = self._solve(scene, before, tolerance, time, step, overlap=overlap, start=start)
             found = inside.after(state, needed_nodes_on_obstacles(state))
-            places = None if found is None else found.by_key(state.contact.points)
+            if found is None:
+                return state
+            tried.append(found.by_key(state.contact.points))
+        if state is None:
+            self._put_inside(at_nodes)
+            return self._solve(scene, before, tolerance, time, step, overlap=overlap, start=start)
+        self._put_inside(_places_of(state, scene.dim))
         return state
 
     def _put_inside(self, places: InFacets) -> None:
