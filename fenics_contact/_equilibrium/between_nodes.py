@@ -127,6 +127,15 @@ def _presses(state: State, number: int) -> bool:
     return bool(state.contact.normal_force[state.contact.on_pair(number)].any())
 
 
+def more_press_than_a_facet_has(state: State, number: int) -> bool:
+    """Return whether more points of a pair press than a facet has corners: most of the force is found."""
+    return _pressing_points(state, number) > 2 ** (state.scene.dim - 1)
+
+
+def _pressing_points(state: State, number: int) -> int:
+    return int(np.count_nonzero(state.contact.normal_force[state.contact.on_pair(number)] > 0.0))
+
+
 def least_depth(moved: float, *, presses: bool) -> float:
     """Return the depth between nodes up to which nothing is missed where surfaces move so far, [length]."""
     return (SHARE if presses else ALONE) * moved
@@ -256,10 +265,10 @@ class InsideFacets:
         Between two bodies, and on the way, one node or mean is enough. Nonlinear bodies have points on each
         other at nodes.
         """
-        pressing = np.count_nonzero(state.contact.normal_force[state.contact.on_pair(number)] > 0.0)
         on_obstacle = not isinstance(state.scene.contacts[number].master, Surface)
-        enough = 2 ** (state.scene.dim - 1) if on_obstacle and not self._on_the_way else 0
-        return bool(pressing > enough) or not (on_obstacle or isinstance(state, LinearState))
+        by_few = on_obstacle and not self._on_the_way
+        found = more_press_than_a_facet_has(state, number) if by_few else _pressing_points(state, number) > 0
+        return found or not (on_obstacle or isinstance(state, LinearState))
 
 
 def _pressing(state: State, missed: Missed, busy: np.ndarray) -> InFacets:

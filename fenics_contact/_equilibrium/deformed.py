@@ -91,25 +91,24 @@ class DeformedEquilibria:
 
         `most`: how often other points are looked for, inside facets that are pierced between their nodes.
         """
-        at_nodes = InFacets.none(scene.dim)
-        tried = [_places_of(before, scene.dim)]
+        places = _places_of(before, scene.dim)
         inside = InsideFacets(scene.dim, on_the_way=before is not None)
         state: DeformedState | None = None
-        while len(tried) <= 1 + (0 if overlap else most):
-            self._put_inside(tried[-1])
+        for _ in range(1 + (0 if overlap else most)):
+            self._put_inside(places)
             try:
                 state = self._solve(scene, before, tolerance, time, step, overlap=overlap, start=start)
             except LoadStepError as failure:
-                if not len(tried[-1].point):
+                if not len(places.point):
                     raise
                 safe_log(_LOG.info, "points inside facets have no equilibrium near: %s", failure)
                 break
             found = inside.after(state, needed_nodes_on_obstacles(state))
             if found is None:
                 return state
-            tried.append(found.by_key(state.contact.points))
+            places = found.by_key(state.contact.points)
         if state is None:
-            self._put_inside(at_nodes)
+            self._put_inside(InFacets.none(scene.dim))
             return self._solve(scene, before, tolerance, time, step, overlap=overlap, start=start)
         self._put_inside(_places_of(state, scene.dim))
         return state

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
-from fenics_contact._equilibrium.between_nodes import between_nodes
+from fenics_contact._equilibrium.between_nodes import between_nodes, more_press_than_a_facet_has
 from fenics_contact._equilibrium.corners_inside import corner_between_nodes
 from fenics_contact._equilibrium.peaks import coarse_peak, unmatched_nodes
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
@@ -30,12 +30,7 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.linear_state import LinearState
-from fenics_contact.results.resolution import (
-    BetweenNodes,
-    CornerBetweenNodes,
-    CornerKeptAway,
-    PeakDoubt,
-)
+from fenics_contact.results.resolution import BetweenNodes, PeakDoubt
 from fenics_contact.results.state import State
 
 #: Errors up to this share of what moves are small.
@@ -123,7 +118,7 @@ class ContactWarnings:
             if doubt := _between_nodes(state, number, deepest):
                 peaks.append(doubt)
                 # Load histories pass through first touches: what is pressed is named in the states alone.
-                small = deepest > 0.0 and not isinstance(doubt, CornerBetweenNodes | CornerKeptAway)
+                small = deepest > 0.0 and doubt.can_be_small
                 small &= not np.isin(state.contact.on_pair(number), state.contact.points.are_inside).any()
                 self._log_doubt(state, Doubt(number, Kind.INSIDE_FACETS, doubt.warning, small))
             if deepest <= computed_rounding(scene.bodies[pair.slave.body].mesh.points):
@@ -408,9 +403,8 @@ def _largest_motion(closing: np.ndarray, pressed_in: np.ndarray, touching: np.nd
 
 def _of_missed(state: State, number: int, doubt: BetweenNodes) -> Doubt:
     """Return the doubt, a small one where more points press than a facet has: most of the force is found."""
-    pressing = np.count_nonzero(state.contact.normal_force[state.contact.on_pair(number)] > 0.0)
-    few = pressing <= 2 ** (state.scene.dim - 1) or isinstance(doubt, CornerBetweenNodes | CornerKeptAway)
-    return Doubt(number, Kind.INSIDE_FACETS, doubt.warning, not few)
+    small = doubt.can_be_small and more_press_than_a_facet_has(state, number)
+    return Doubt(number, Kind.INSIDE_FACETS, doubt.warning, small)
 
 
 def _between_nodes(state: State, number: int, moved: float) -> BetweenNodes | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from fenics_contact._base.display import counted
 
@@ -68,6 +69,9 @@ class BetweenNodes:
     moved: float
     at: tuple[float, ...]
 
+    #: Whether most of the force may be found all the same, as where many nodes press.
+    can_be_small: ClassVar[bool] = True
+
     @property
     def _where(self) -> str:
         return ", ".join(f"{x:.4g}" for x in self.at)
@@ -102,6 +106,8 @@ class CornerBetweenNodes(BetweenNodes):
         at: The corner, [length].
     """
 
+    can_be_small: ClassVar[bool] = False
+
     @property
     def warning(self) -> str:
         """What is missed, where, and what to do."""
@@ -123,6 +129,8 @@ class CornerKeptAway(BetweenNodes):
         moved: How far they move against each other, [length].
         at: The corner, [length].
     """
+
+    can_be_small: ClassVar[bool] = False
 
     @property
     def warning(self) -> str:
