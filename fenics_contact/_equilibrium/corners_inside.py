@@ -10,9 +10,9 @@ from fenics_contact._equilibrium.between_nodes import displaced_at, least_depth,
 from fenics_contact._pairing.inside import InsideOf
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import sharp_at
-from fenics_contact._surfaces.corners import lie_flat
+from fenics_contact._surfaces.corners import corners_over
 from fenics_contact._surfaces.facets import FacetedSurface, corner_places
-from fenics_contact._surfaces.projection import Projection, node_weights, project
+from fenics_contact._surfaces.projection import Projection, node_weights
 from fenics_contact.errors import together
 from fenics_contact.mesh.faces import computed_rounding
 from fenics_contact.results.resolution import BetweenNodes, CornerBetweenNodes, CornerKeptAway
@@ -20,9 +20,6 @@ from fenics_contact.results.state import State
 
 #: Corners that were deeper inside than this many widths of a facet belong to another side of the slave.
 WIDTHS = 0.5
-#: Cosine of the angle up to which a face beside a corner lies flat on the slave, whose nodes find it. Facets
-#: of round bodies, whose joints may look like edges where cells are large, are not steeper there.
-FLAT = float(np.cos(np.radians(15.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +52,8 @@ class _Corners:
         master = sides.master
         assert master is not None
         nodes = sides.nodes, sides.numbers.global_nodes(pair.master.body, master.nodes)
-        hit = project(master.points[sharp], master.normals[sharp], sides.slave)
-        hit = hit.part(~lie_flat(master, sharp[hit.point], hit.normal, FLAT))
-        return cls(sides, master, nodes, sharp[hit.point], hit) if len(hit.point) else None
+        node, hit = corners_over(master, sharp, sides.slave)
+        return cls(sides, master, nodes, node, hit) if len(node) else None
 
     def followed(self, moved: np.ndarray) -> np.ndarray:
         """Return how far corners move against the slave, from displacements of all nodes, (n, dim)."""

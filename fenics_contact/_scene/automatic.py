@@ -16,7 +16,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
 from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._scene.surface_laws import ClosureLaw, check_closing
-from fenics_contact._surfaces.corners import lie_flat
+from fenics_contact._surfaces.corners import corners_over
 from fenics_contact._surfaces.projection import project
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
@@ -164,17 +164,13 @@ class AutomaticContact(Sequence[ContactPair]):
         return replace(pair, slave=sides[1], master=sides[0]) if other_is_better else pair
 
 
-def _touches_with_a_corner(scene: SceneParts, side: Surface, other: Surface, flat: float = 15.0) -> bool:
-    """Return whether a corner or an edge of a side is nearest to the other one.
-
-    `flat`: angle between faces up to which one lies flat on the other, in degrees.
-    """
+def _touches_with_a_corner(scene: SceneParts, side: Surface, other: Surface) -> bool:
+    """Return whether a corner or an edge of a side is nearest to the other one."""
     from fenics_contact._scene.parts import sharp_at, surface_of
 
     own, opposite = (surface_of(scene, each, "faceted") for each in (side, other))
     sharp = np.flatnonzero(sharp_at(scene, side))
-    hit = project(own.points[sharp], own.normals[sharp], opposite)
-    hit = hit.part(~lie_flat(own, sharp[hit.point], hit.normal, float(np.cos(np.radians(flat)))))
+    _, hit = corners_over(own, sharp, opposite)
     if not len(hit.point):
         return False
     nearest = project(own.points, own.normals, opposite).gap.min()

@@ -7,6 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, nodal_areas
+from fenics_contact._surfaces.projection import Projection, project
 from fenics_contact._surfaces.true_surface import is_crease, joints_of
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces, vector_areas
@@ -63,7 +64,23 @@ def _sharp(mesh: BodyMesh, nodes: np.ndarray, cuts: np.ndarray) -> np.ndarray:
     return np.isin(nodes, surface.nodes[surface.facets.ravel()[creases]])
 
 
-def lie_flat(surface: FacetedSurface, node: np.ndarray, normal: np.ndarray, cosine: float) -> np.ndarray:
+def corners_over(
+    surface: FacetedSurface, sharp: np.ndarray, other: FacetedSurface, flat: float = 15.0
+) -> tuple[np.ndarray, Projection]:
+    """Return sharp nodes that touch another surface as corners do, and where they lie over it.
+
+    Where a face beside a corner lies flat on the other surface, nodes of that find it.
+
+    `sharp`: positions of nodes in ``surface.nodes``; `flat`: angle up to which a face lies flat, in degrees.
+    Facets of round bodies, whose joints may look like edges where cells are large, are not steeper there.
+    """
+    hit = project(surface.points[sharp], surface.normals[sharp], other)
+    cosine = float(np.cos(np.radians(flat)))
+    hit = hit.part(~_lie_flat(surface, sharp[hit.point], hit.normal, cosine))
+    return sharp[hit.point], hit
+
+
+def _lie_flat(surface: FacetedSurface, node: np.ndarray, normal: np.ndarray, cosine: float) -> np.ndarray:
     """Return which nodes of a surface have a facet that lies flat on the other one, shape (n,).
 
     `node`: positions in ``surface.nodes``, shape (n,); `normal`: of the other surface there, shape (n, dim);
