@@ -229,12 +229,17 @@ def _directions(known: np.ndarray, trial: np.ndarray, length: np.ndarray, weak: 
     return np.where(weak[:, None], directions, known)
 
 
-#: Said where a face does not hold every body.
-NOT_HELD = (
-    "the adjoint needs a contact face that holds every body, but from this state some body can slide without "
-    "resistance: refine the contact until more points hold it, add a support, choose WeakChoice.HELD where "
-    "points are weakly active, or take a design away from this one"
-)
+class NoAdjointError(ConvergenceError):
+    """The face of a state does not determine an adjoint: some body can slide on it."""
+
+    @classmethod
+    def of_loose_body(cls) -> NoAdjointError:
+        """Return the error where a face does not hold every body."""
+        return cls(
+            "the adjoint needs a contact face that holds every body, but from this state some body can slide "
+            "without resistance: refine the contact until more points hold it, add a support, choose "
+            "WeakChoice.HELD where points are weakly active, or take a design away from this one"
+        )
 
 
 @displayed
@@ -291,7 +296,7 @@ def solve_adjoint(
         face_system, problem.coarse, linearised.moving, linearised.tested, damped=True
     )
     if transposed is None:
-        raise ConvergenceError(NOT_HELD)
+        raise NoAdjointError.of_loose_body()
     flexed = system.inverse(partials.by_displacement)
     # Rows that supports alone determine have no force, whatever an objective makes of it.
     entries = system.torn.numbering.to_owned(np.asarray(abs(system.torn.B).sum(axis=1)).ravel())
@@ -319,7 +324,9 @@ def solve_adjoint(
             if problem.norm(transposed.oblique(gradient)) <= 10.0 * small:
                 break
     if solved.stop is not Stop.CONVERGED:
-        raise ConvergenceError(
+        # Of a load outside the range of a singular operator rounding decides which of both is found.
+        singular = solved.stop in (Stop.NO_CURVATURE, Stop.STAGNATION)
+        raise (NoAdjointError if singular else ConvergenceError)(
             f"the adjoint needs a relative residual below {small / (begin.size or 1.0):.1e}, reached "
             f"{solved.measure / (begin.size or 1.0):.1e} after {iterations} iterations "
             f"({solved.stop.value}): raise max_iterations or loosen the tolerance"

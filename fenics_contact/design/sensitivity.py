@@ -11,9 +11,9 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._large_deformations.tangent_step import tangent_adjoint
 from fenics_contact._scene.local_axes import free_part
 from fenics_contact.design.adjoint import (
-    NOT_HELD,
     Adjoint,
     LinearisedFace,
+    NoAdjointError,
     StateError,
     growth_of,
     solve_adjoint,
@@ -96,7 +96,7 @@ def solve_deformed_adjoint(
     load = np.asarray(tangent.problem.comm.allreduce(system.kernel.resultants(partials.by_displacement)))
     found = tangent_adjoint(tangent, face, coupling, right, load, tolerance, max_iterations)
     if found is None:
-        raise ConvergenceError(NOT_HELD)
+        raise NoAdjointError.of_loose_body()
     if found.stop is not Stop.CONVERGED:
         raise ConvergenceError(
             f"the adjoint of the deformed state needs a relative residual below {tolerance:.1e}, not reached "

@@ -42,7 +42,7 @@ from fenics_contact.design import (
     StrainEnergy,
     TotalPotential,
 )
-from fenics_contact.design.adjoint import NOT_HELD, WeakChoice, linearise_face, solve_adjoint
+from fenics_contact.design.adjoint import NoAdjointError, WeakChoice, linearise_face, solve_adjoint
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import block, hemisphere, rectangle
@@ -308,7 +308,7 @@ def test_without_an_adjoint_cells_have_their_shares_of_the_energy_norm(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def failing(*_: object, **__: object) -> None:
-        raise ConvergenceError(NOT_HELD)
+        raise NoAdjointError.of_loose_body()
 
     monkeypatch.setattr(goal_errors, "adjoint_of", failing)
     found = goal_error(state("floor", 4), StrainEnergy())
@@ -318,7 +318,7 @@ def test_without_an_adjoint_cells_have_their_shares_of_the_energy_norm(
     np.testing.assert_allclose(found.by_cell("block"), norm.norm * norm.by_cell("block"))
 
     def singular(*_: object, **__: object) -> None:
-        raise ConvergenceError(f"the adjoint stopped ({Stop.NO_CURVATURE.value})")
+        raise NoAdjointError(f"the adjoint stopped ({Stop.NO_CURVATURE.value})")
 
     monkeypatch.setattr(goal_errors, "adjoint_of", singular)
     assert "singular on this face" in goal_error(state("floor", 4), StrainEnergy()).without_adjoint
