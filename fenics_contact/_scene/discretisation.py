@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fenics_contact._scene.choice import Choice
 from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface
 from fenics_contact._scene.parts import SceneParts
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
@@ -21,7 +22,7 @@ from fenics_contact.mesh.near_surfaces import FACING
 
 #: Why every contact with an obstacle is by nodes.
 RIGID = "as the master is rigid"
-#: Reason of a choice that other meshes do not change.
+#: Why a choice stays that other meshes do not change.
 REMESHED = "as on the meshes before the last one"
 
 Pair = TypeVar("Pair", bound=ContactPair | AnyTie)
@@ -54,17 +55,19 @@ def in_words(pair: ContactPair | AnyTie) -> str:
 
 
 def _with_choice(scene: SceneParts, pair: Pair) -> Pair:
-    chosen = pair.discretisation == "best" or bool(pair.reason)
-    if not chosen or pair.reason.endswith(REMESHED):
+    chosen = pair.discretisation in ("best", pair.choice.found)
+    if not chosen or pair.choice.stays:
         return pair
     found, why = _choice(scene, pair)
-    reason = f"{found}, {why}"
-    return pair if pair.reason == reason else replace(pair, discretisation=found, reason=reason)
+    choice = Choice(found, why)
+    return pair if pair.choice == choice else replace(pair, discretisation=found, choice=choice)
 
 
 def _kept(pair: Pair) -> Pair:
     """Return a pair whose choice does not depend on meshes any more."""
-    return replace(pair, reason=f"{pair.discretisation}, {REMESHED}") if pair.reason else pair
+    if pair.choice.found != pair.discretisation:
+        return pair
+    return replace(pair, choice=Choice(pair.discretisation, REMESHED, stays=True))
 
 
 def _choice(scene: SceneParts, pair: ContactPair | AnyTie) -> tuple[Discretisation, str]:

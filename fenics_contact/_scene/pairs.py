@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import Table, in_notebooks, in_short, name_in_words, tabled
+from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
@@ -130,7 +131,7 @@ Friction: TypeAlias = Coulomb | Tresca | None
 @in_notebooks
 @dataclass(frozen=True)
 @checked()
-class ContactPair:
+class ContactPair(Chosen):
     """Two surfaces that may touch. The slave may not penetrate the master.
 
     Attributes:
@@ -161,7 +162,7 @@ class ContactPair:
         nodes: Name of a node set of the slave's body, on the slave surface: its nodes alone may touch, as
             those of a tip or an edge, each with its share of the slave surface as its area. Contact is by
             nodes then. None: the whole slave may touch.
-        reason: Why the scene chose the discretisation that it has, in words; empty where it was given.
+        choice: What the scene chose where the best is asked for; see ``reason``.
 
     Raises:
         InvalidInputError: If the discretisation or geometry is unknown, or both gap and interference, or
@@ -184,7 +185,7 @@ class ContactPair:
     closure: ClosureLaw | None = None
     fluid: FluidPressure | None = None
     nodes: str | None = None
-    reason: str = field(default="", repr=False)
+    choice: Choice = field(default=NO_CHOICE, repr=False)
 
     def __post_init__(self) -> None:
         """Reject gaps that contradict each other or are no lengths."""
@@ -209,7 +210,6 @@ class ContactPair:
                 f"contact of the nodes of {self.nodes!r} alone is by nodes and between two bodies, got "
                 f"{given}: leave the nodes out, or give no discretisation and a master of another body"
             )
-        forget_other_reason(self)
 
     @property
     def within_body(self) -> bool:
@@ -330,7 +330,7 @@ class ContactPair:
 @in_notebooks
 @dataclass(frozen=True)
 @checked()
-class Tie:
+class Tie(Chosen):
     """Two surfaces that stay together: they neither separate nor, unless ``sliding``, shift.
 
     An initial gap between their meshes stays as it is.
@@ -341,14 +341,14 @@ class Tie:
         sliding: Whether the surfaces may slide along each other: contact known to be closed.
         discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` ties weighted
             means, ``"best"``, the default, leaves it to the scene. See `ContactPair`.
-        reason: As in `ContactPair`.
+        choice: As in `ContactPair`.
     """
 
     slave: Surface
     master: Surface
     sliding: bool = False
     discretisation: AnyDiscretisation = "best"
-    reason: str = field(default="", repr=False)
+    choice: Choice = field(default=NO_CHOICE, repr=False)
 
     def __post_init__(self) -> None:
         """Reject a body that is tied to itself."""
@@ -357,7 +357,6 @@ class Tie:
                 f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "
                 "together, or as two bodies"
             )
-        forget_other_reason(self)
 
     @property
     def geometry(self) -> Geometry:
@@ -396,12 +395,6 @@ def _check_stiffness(name: str, given: float | None) -> None:
             f"{name}.stick_stiffness must be positive and finite, got {given!r}: give the friction traction "
             "per tangential displacement, or leave it out for points that stick without moving"
         )
-
-
-def forget_other_reason(pair: Any) -> None:
-    """Drop the reason for a choice in whose place another discretisation was given."""
-    if not pair.reason.startswith(f"{pair.discretisation}, "):
-        object.__setattr__(pair, "reason", "")
 
 
 def _check_length(name: str, value: float | OfPosition | str | None) -> None:

@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
 from fenics_contact._scene.local_axes import HeldDirections
-from fenics_contact._scene.pairs import AnyDiscretisation, Surface, Tie, forget_other_reason, place_of
+from fenics_contact._scene.pairs import AnyDiscretisation, Surface, Tie, place_of
 from fenics_contact._surfaces.facets import surface_moments
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
@@ -21,7 +22,7 @@ from fenics_contact.shapes.simple import tangent_bases
 
 @dataclass(frozen=True)
 @checked()
-class CyclicSymmetry:
+class CyclicSymmetry(Chosen):
     """Both sides of a sector that repeats around an axis: u_slave = R u_master, R turns master onto slave.
 
     One of the `Scene.ties`. The sector is 360°/N of a whole whose loads and supports repeat, too; all its
@@ -36,7 +37,7 @@ class CyclicSymmetry:
         angle: Angle by which R turns about the axis, in radians, positive by the right-hand rule, in the
             plane from x to y. By default it is measured between the sides.
         discretisation: As in `Tie`.
-        reason: As in `ContactPair`.
+        choice: As in `ContactPair`.
 
     Raises:
         InvalidInputError: If the point or the axis is not finite, or the angle is not 360°/N.
@@ -52,7 +53,7 @@ class CyclicSymmetry:
     axis: GivenVector | None = None
     angle: float | None = None
     discretisation: AnyDiscretisation = "best"
-    reason: str = field(default="", repr=False)
+    choice: Choice = field(default=NO_CHOICE, repr=False)
 
     def __post_init__(self) -> None:
         """Reject points and axes that are not finite, and an angle that does not divide a turn."""
@@ -76,7 +77,6 @@ class CyclicSymmetry:
                 f"CyclicSymmetry needs both sides of a sector, got {self.place}: name the other side as "
                 "master"
             )
-        forget_other_reason(self)
 
     @property
     def sliding(self) -> bool:

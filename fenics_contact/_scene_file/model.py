@@ -241,7 +241,7 @@ class FluidPart(Part):
     enters: str = Field(description="surface of the slave's body with which the slave shares an edge")
 
 
-@keys_of(ContactPair, without={"reason"})
+@keys_of(ContactPair, without={"choice"})
 class ContactPart(Part):
     """Two surfaces that may touch, or a surface and a rigid obstacle."""
 
@@ -268,7 +268,7 @@ class AutomaticPart(Part):
     closure: AnyClosure | None
 
 
-@keys_of(Tie, without={"reason"})
+@keys_of(Tie, without={"choice"})
 class TiePart(Part):
     """Two surfaces that stay together."""
 
@@ -276,7 +276,7 @@ class TiePart(Part):
     master: SurfaceOfBody
 
 
-@keys_of(CyclicSymmetry, without={"reason"})
+@keys_of(CyclicSymmetry, without={"choice"})
 class CyclicPart(Part):
     """Both sides of a sector that repeats around an axis."""
 

@@ -102,7 +102,8 @@ def _material(material: Material) -> dict[str, Any]:
 
 
 def _described_pair(pair: ContactPair | AnyTie, time: float) -> dict[str, Any]:
-    entries = {part.name: readable(getattr(pair, part.name)) for part in fields(pair)}
+    names = [part.name for part in fields(pair) if part.name != "choice"]
+    entries = {name: readable(getattr(pair, name)) for name in [*names, "reason"]}
     for side in ("slave", "master"):
         surface = getattr(pair, side)
         if isinstance(surface, Surface):

@@ -1,0 +1,42 @@
+"""What a scene chose for a pair that asks for the best, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The discretisation that a scene chose.
+
+    Attributes:
+        found: It, empty where none was chosen.
+        why: In words.
+        stays: Whether other meshes do not change it.
+    """
+
+    found: str = ""
+    why: str = ""
+    stays: bool = False
+
+
+#: Of pairs whose discretisation is given.
+NO_CHOICE = Choice()
+
+
+class Chosen:
+    """A pair whose discretisation is given, or was chosen by its scene.
+
+    Attributes:
+        discretisation: What it is.
+        choice: What the scene chose; another discretisation was given in its place where they differ.
+    """
+
+    discretisation: str
+    choice: Choice
+
+    @property
+    def reason(self) -> str:
+        """Why the scene chose the discretisation that it has, in words; empty where it was given."""
+        chosen = self.choice.found == self.discretisation
+        return f"{self.choice.found}, {self.choice.why}" if chosen else ""
