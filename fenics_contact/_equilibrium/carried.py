@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fenics_contact._base.display import displayed
+from fenics_contact._equilibrium.outer_loops import outer_loops
 from fenics_contact._equilibrium.starts import CoarseStart
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
@@ -65,11 +66,9 @@ class CarriedState:
                 "transfers of a CarriedState must lead from the meshes of its state to those of the scene, "
                 f"got others, of {sorted(self.transfers)}: give the refinements with which both were made"
             )
-        pairs = scene.contacts
         kept = {
-            "friction that depends on slip": any(pair.slip_table is not None for pair in pairs),
-            "fluid that enters contacts": any(pair.fluid is not None for pair in pairs),
-            "contact of bodies that deform much": bool(pairs) and scene.deforms_much,
+            **{loop.name: True for loop in outer_loops(scene)},
+            "contact of bodies that deform much": bool(scene.contacts) and scene.deforms_much,
             "preloads in scenes with nonlinear materials": bool(scene.preloads) and scene.is_nonlinear,
         }
         what = [words for words, there in kept.items() if there]

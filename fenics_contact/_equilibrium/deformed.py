@@ -12,6 +12,7 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes_on_obstacles, with_places
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.other_rows import prescribed_as_is
+from fenics_contact._equilibrium.outer_loops import outer_loops
 from fenics_contact._equilibrium.starts import CoarseStart, carried_over
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
@@ -187,7 +188,7 @@ class DeformedEquilibria:
         Rigid surfaces turn along their arcs, fluid goes on, and slip begins where nodes are first found.
         """
         steps = self._steps
-        by_way = load.turned or any(pair.fluid is not None for pair in load.torn.scene.contacts)
+        by_way = load.turned or bool(outer_loops(load.torn.scene))
         if not isinstance(coarse, CoarseStart) or by_way or steps.snaps or steps.finer_history:
             return None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.display import counted
-from fenics_contact._equilibrium.passes import Passes, Solve
-from fenics_contact.errors import ConvergenceError, together
+from fenics_contact._equilibrium.passes import Passes
+from fenics_contact.errors import ConvergenceError, InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.contact import ContactResult
@@ -81,34 +82,59 @@ class Front:
         return open_ & np.isin(part, part[open_ & self.inlet])
 
 
-def penetrated(solve: Solve, torn: TornSystem, known: State | None, before: State | None) -> LinearState:
-    """Return the state in which fluid is just where contact is open to it. Collective.
+class FluidFront:
+    """The front of fluids that enter contacts: passes until it stays where it is."""
 
-    Every pass is one solution; fluid that opens the next points moves on. Where the front comes back to an
-    earlier place, pressures and friction let it move forth and back, and there is no such state.
+    name = "fluid that enters contacts"
 
-    Raises:
-        ConvergenceError: If the front does not come to rest; carries the history of all passes.
-    """
-    front = Front.of(torn)
-    wet = np.zeros(torn.points.count, dtype=bool)
-    if before is not None and before.contact.wet is not None and len(before.contact.wet) == len(wet):
-        wet = before.contact.wet
-    passes = Passes(solve, known)
-    earlier: list[bytes] = []
-    while wet.tobytes() not in earlier:
-        earlier.append(wet.tobytes())
-        state = passes.run(front.at(torn, wet))
-        words = f"fluid pass {passes.count}: {counted(int(wet.sum()), 'point')} wet"
-        safe_log(_LOG.info, "%s", words)
-        passes.remark(words)
-        following = front.reached(state.contact)
-        if np.array_equal(following, wet):
-            return passes.answer(state)
-        wet = following
-    raise ConvergenceError(
-        f"the front of a fluid must come to rest, but after {counted(passes.count, 'pass', 'passes')} it "
-        f"returns to {counted(int(wet.sum()), 'wet point')} where it was before: apply pressure and load in "
-        "smaller load steps, refine the contact, or give the fluid a critical pressure",
-        passes.history,
-    )
+    def require_derivatives(self, torn: TornSystem, before: State | None) -> None:
+        """Reject motions that are found: they move with the front."""
+        if torn.free.count:
+            raise InvalidInputError(
+                "derivatives by the shape with fluid that enters a contact need rigid tools and surfaces "
+                "whose whole motion is prescribed, and preloads by a shortening: prescribe the motion, "
+                "or load the wetted surfaces by Pressure"
+            )
+
+    def pass_tolerance(self, wanted: float) -> float:
+        """Return that of the state."""
+        return wanted
+
+    def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
+        """Return the state in which fluid is just where contact is open to it. Collective.
+
+        Every pass is one solution; fluid that opens the next points moves on. Where the front comes back to
+        an earlier place, pressures and friction let it move forth and back, and there is no such state.
+
+        Raises:
+            ConvergenceError: If the front does not come to rest; carries the history of all passes.
+        """
+        front = Front.of(torn)
+        wet = np.zeros(torn.points.count, dtype=bool)
+        if before is not None and before.contact.wet is not None and len(before.contact.wet) == len(wet):
+            wet = before.contact.wet
+        earlier: list[bytes] = []
+        while wet.tobytes() not in earlier:
+            earlier.append(wet.tobytes())
+            state = passes.run(front.at(torn, wet))
+            words = f"fluid pass {passes.count}: {counted(int(wet.sum()), 'point')} wet"
+            safe_log(_LOG.info, "%s", words)
+            passes.remark(words)
+            following = front.reached(state.contact)
+            if np.array_equal(following, wet):
+                return passes.answer(state)
+            wet = following
+        raise ConvergenceError(
+            f"the front of a fluid must come to rest, but after {counted(passes.count, 'pass', 'passes')} it "
+            f"returns to {counted(int(wet.sum()), 'wet point')} where it was before: apply pressure and load "
+            "in smaller load steps, refine the contact, or give the fluid a critical pressure",
+            passes.history,
+        )
+
+    def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
+        """Return where fluid is."""
+        return {} if torn.fluid is None else {"wet": torn.fluid.wet}
+
+    def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
+        """Return the system with fluid where it was. Collective."""
+        return Front.of(torn).at(torn, stored["wet"]) if "wet" in stored else torn

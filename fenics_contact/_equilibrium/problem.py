@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
 from fenics_contact._equilibrium.other_rows import has_rows_of, on_rows_of, with_kept
+from fenics_contact._equilibrium.outer_loops import OuterLoop, nested, outer_loops
 from fenics_contact._equilibrium.passes import Passes
 from fenics_contact._equilibrium.starts import (
     CoarseStart,
@@ -158,20 +159,13 @@ class LinearEquilibria:
         # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
         if tolerance is None and (self._solver is not None or design):
             tolerance = solver.tolerance
-        if any(pair.fluid is not None or pair.slip_table is not None for pair in torn.scene.contacts):
-            if design and before and any(pair.slip_table is not None for pair in torn.scene.contacts):
-                raise InvalidInputError(
-                    "derivatives by the shape with friction by slip need a single load step: give the "
-                    "coefficient as a number, a function of the place or a FrictionTable"
-                )
-            if design and torn.free.count:
-                raise InvalidInputError(
-                    "derivatives by the shape with fluid that enters a contact need rigid tools and surfaces "
-                    "whose whole motion is prescribed, and preloads by a shortening: prescribe the motion, "
-                    "or load the wetted surfaces by Pressure"
-                )
+        loops = outer_loops(torn.scene)
+        if loops:
             assert not isinstance(before, CarriedState)  # refused by its check
-            return self._by_passes(torn, tolerance, solver, start, known, before)
+            if design:
+                for loop in loops:
+                    loop.require_derivatives(torn, before)
+            return self._by_passes(torn, loops, tolerance, solver, start, known, before)
         system = DualSystem(torn, self._timer, previous=reused)
         with self._timer.phase("solve"):
             first = first_guess(start, system)
@@ -199,40 +193,28 @@ class LinearEquilibria:
     def _by_passes(
         self,
         torn: TornSystem,
+        loops: Sequence[OuterLoop],
         tolerance: Tolerance,
         solver: DualSolver,
         start: State | CoarseStart | None,
         known: State | None,
         before: State | None,
     ) -> LinearState:
-        """Compute a state whose fluid is where contact is open, or friction fits its slip. Collective."""
-        # The front needs the status of every point, which a balanced state leaves uncertain.
+        """Compute a state that agrees with what its outer loops find. Collective."""
+        # They need the status of every point, which a balanced state leaves uncertain.
         wanted = tolerance if isinstance(tolerance, float) else solver.tolerance
-        by_slip = any(pair.slip_table is not None for pair in torn.scene.contacts)
-        # Errors of passes must not pass for changes of friction.
-        finer = min(wanted, max(0.1 * wanted, 1e-10)) if by_slip else wanted
+        finest = min(loop.pass_tolerance(wanted) for loop in loops)
 
         def solve(system_of: TornSystem, last: LinearState | None) -> LinearState:
             reused = known_system(last)
             system = DualSystem(system_of, self._timer, previous=reused)
             with self._timer.phase("solve"):
                 first = first_guess(last or start, system)
-                solution = solve_dual(system, solver.with_tolerance(finer), first)
+                solution = solve_dual(system, solver.with_tolerance(finest), first)
             return self._state(system, solution, tolerance=wanted)
 
-        def wetted(system_of: TornSystem, last: LinearState | None) -> LinearState:
-            if all(pair.fluid is None for pair in torn.scene.contacts):
-                return solve(system_of, last)
-            from fenics_contact._equilibrium.penetration import penetrated
-
-            # From the front of the pass before, in this step.
-            return penetrated(solve, system_of, last, before if last is known else last)
-
-        if not by_slip:
-            return wetted(torn, cast("LinearState | None", known))
-        from fenics_contact._equilibrium.slip_dependence import consistent
-
-        return consistent(wetted, torn, known, before, wanted)
+        first = known if isinstance(known, LinearState) else None
+        return nested(loops, solve, first, before, wanted)(torn, first)
 
     def restored(self, stored: Stored, scene: Scene, known: State | None) -> LinearState:
         """Build a state from what `stored_state` returned, with at most one product. Collective."""
@@ -241,14 +223,8 @@ class LinearEquilibria:
             return self._directly(torn, known)
         with self._timer.phase("assemble"):
             torn = with_stored_slip(with_places(torn, InFacets.restored(stored, scene.dim)), stored)
-        if "coefficient" in stored:
-            from fenics_contact._equilibrium.slip_dependence import with_coefficients
-
-            torn = with_coefficients(torn, stored["coefficient"])
-        if "wet" in stored:
-            from fenics_contact._equilibrium.penetration import Front
-
-            torn = Front.of(torn).at(torn, stored["wet"])
+        for loop in outer_loops(scene):
+            torn = loop.restored(torn, stored)
         system = DualSystem(torn, self._timer, previous=known_system(known))
         with self._timer.phase("state"):
             solution = restored_solution(system, stored)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fenics_contact._base.display import counted
-from fenics_contact._equilibrium.passes import Passes, Solve
-from fenics_contact.errors import ConvergenceError
+from fenics_contact._equilibrium.passes import Passes
+from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
@@ -32,58 +33,76 @@ def with_coefficients(torn: TornSystem, coefficient: np.ndarray) -> TornSystem:
     return replace(torn, friction_coefficient=coefficient, strengths=strengths)
 
 
-def consistent(
-    solve: Solve,
-    torn: TornSystem,
-    known: State | None,
-    before: State | None,
-    tolerance: float,
-    *,
-    max_passes: int = 100,
-) -> LinearState:
-    """Return the state whose friction coefficients are those of its slips. Collective.
+@dataclass(frozen=True)
+class FrictionBySlip:
+    """Friction coefficients of pairs with a `SlipTable`: passes until they are those of the slips."""
 
-    Every pass is one solution at given coefficients, of whose change the next takes over a part θ: all of it
-    at first, then what the last two changes r ask for, θ ← −θ r₀·(r₁ − r₀) / ‖r₁ − r₀‖². It is less than one
-    where they alternate, as friction that rises steeply makes them, and more where they only get smaller.
-    Where friction falls faster with the slip than bodies are stiff, changes grow in one direction: θ = 1
-    follows them to where it falls no more. There may be several states, or none.
+    name = "friction that depends on slip"
+    max_passes: int = 100
 
-    `tolerance`: largest change of a slip bound relative to the largest.
+    def require_derivatives(self, torn: TornSystem, before: State | None) -> None:
+        """Reject later load steps, whose slip begins at a state that depends on the shape, too."""
+        if before is not None:
+            raise InvalidInputError(
+                "derivatives by the shape with friction by slip need a single load step: give the "
+                "coefficient as a number, a function of the place or a FrictionTable"
+            )
 
-    Raises:
-        ConvergenceError: If they do not agree; carries the history of all passes.
+    def pass_tolerance(self, wanted: float) -> float:
+        """Return a smaller one: errors of passes must not pass for changes of friction."""
+        return min(wanted, max(0.1 * wanted, 1e-10))
 
-    References:
-        U. Küttler, W. A. Wall, Fixed-point fluid–structure interaction solvers with dynamic relaxation,
-        Comput. Mech. 43 (2008) 61–72.
-    """
-    slip = np.zeros((torn.points.count, torn.components - 1))
-    if before is not None and before.contact.total_slip.shape == slip.shape:
-        slip = before.contact.total_slip
-    mu, part, last = coefficients(torn, slip), 1.0, np.zeros(0)
-    passes = Passes(solve, known)
-    while passes.count < max_passes:
-        state = passes.run(with_coefficients(torn, mu))
-        contact = state.contact
-        target = coefficients(torn, contact.total_slip)
-        pressed = contact.normal_force[torn.frictional]
-        size = float((np.maximum(mu, target) * pressed).max(initial=0.0))
-        missing = (target - mu) * pressed
-        change = float(np.abs(missing).max(initial=0.0)) / (size or 1.0)
-        passes.remark(f"slip pass {passes.count}: slip bounds changed by {change:.1e}")
-        if change <= tolerance:
-            return passes.answer(state)
-        if len(last):
-            turn = missing - last
-            part *= -float(last @ turn) / (float(turn @ turn) or 1.0)
-            part = part if part > 0.0 else 1.0
-        mu, last = np.maximum(mu + part * (target - mu), 0.0), missing
-    raise ConvergenceError(
-        "friction coefficients must agree with the slips, but after "
-        f"{counted(passes.count, 'pass', 'passes')} "
-        f"slip bounds still change by {change:.1e} of the largest: friction that falls with the slip faster "
-        "than bodies are stiff has several states or none, as in stick-slip; take smaller load steps, drive "
-        "the bodies by displacements, or let the coefficient fall over a longer slip",
-        passes.history,
-    )
+    def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
+        """Return the state whose friction coefficients are those of its slips. Collective.
+
+        Every pass is one solution at given coefficients, of whose change the next takes over a part θ: all of
+        it at first, then what the last two changes r ask for, θ ← −θ r₀·(r₁ − r₀) / ‖r₁ − r₀‖². It is less
+        than one where they alternate, as friction that rises steeply makes them, and more where they only get
+        smaller. Where friction falls faster with the slip than bodies are stiff, changes grow in one
+        direction: θ = 1 follows them to where it falls no more. There may be several states, or none.
+
+        The tolerance is the largest change of a slip bound relative to the largest.
+
+        Raises:
+            ConvergenceError: If they do not agree; carries the history of all passes.
+
+        References:
+            U. Küttler, W. A. Wall, Fixed-point fluid–structure interaction solvers with dynamic relaxation,
+            Comput. Mech. 43 (2008) 61–72.
+        """
+        slip = np.zeros((torn.points.count, torn.components - 1))
+        if before is not None and before.contact.total_slip.shape == slip.shape:
+            slip = before.contact.total_slip
+        mu, part, last = coefficients(torn, slip), 1.0, np.zeros(0)
+        while passes.count < self.max_passes:
+            state = passes.run(with_coefficients(torn, mu))
+            contact = state.contact
+            target = coefficients(torn, contact.total_slip)
+            pressed = contact.normal_force[torn.frictional]
+            size = float((np.maximum(mu, target) * pressed).max(initial=0.0))
+            missing = (target - mu) * pressed
+            change = float(np.abs(missing).max(initial=0.0)) / (size or 1.0)
+            passes.remark(f"slip pass {passes.count}: slip bounds changed by {change:.1e}")
+            if change <= tolerance:
+                return passes.answer(state)
+            if len(last):
+                turn = missing - last
+                part *= -float(last @ turn) / (float(turn @ turn) or 1.0)
+                part = part if part > 0.0 else 1.0
+            mu, last = np.maximum(mu + part * (target - mu), 0.0), missing
+        raise ConvergenceError(
+            "friction coefficients must agree with the slips, but after "
+            f"{counted(passes.count, 'pass', 'passes')} "
+            f"slip bounds still change by {change:.1e} of the largest: friction that falls with the slip "
+            "faster than bodies are stiff has several states or none, as in stick-slip; take smaller load "
+            "steps, drive the bodies by displacements, or let the coefficient fall over a longer slip",
+            passes.history,
+        )
+
+    def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
+        """Return the coefficients."""
+        return {"coefficient": torn.friction_coefficient}
+
+    def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
+        """Return the system with the coefficients as they were."""
+        return with_coefficients(torn, stored["coefficient"])

@@ -22,6 +22,7 @@ from fenics_contact._base.files import CheckpointError
 from fenics_contact._base.fingerprint import described, differences, require_alike
 from fenics_contact._base.progress import Task
 from fenics_contact._equilibrium.other_rows import require_values_to_keep, with_kept
+from fenics_contact._equilibrium.outer_loops import outer_loops
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -62,13 +63,8 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
         "motion": np.asarray(solution.alpha),
         **held_lengths(state.scene),
         **InFacets.of(torn.points).stored(),
-        **({} if torn.fluid is None else {"wet": torn.fluid.wet}),
-        **({"coefficient": torn.friction_coefficient} if _by_slip(state.scene) else {}),
+        **{name: array for loop in outer_loops(state.scene) for name, array in loop.stored(torn).items()},
     }
-
-
-def _by_slip(scene: Scene) -> bool:
-    return any(pair.slip_table is not None for pair in scene.contacts)
 
 
 def held_lengths(scene: Scene) -> dict[str, np.ndarray]:

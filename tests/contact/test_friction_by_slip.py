@@ -26,6 +26,7 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact._equilibrium import slip_dependence
+from fenics_contact._equilibrium.passes import Passes
 from fenics_contact._equilibrium.steps import stored_state
 from fenics_contact.design import LoadPath, slip_friction
 from fenics_contact.errors import ConvergenceError, InvalidInputError
@@ -113,7 +114,7 @@ def test_coefficients_that_do_not_agree_are_an_error_with_their_history() -> Non
     with pytest.raises(
         ConvergenceError, match=r"must agree with the slips, .* as in stick-slip; take"
     ) as error:
-        slip_dependence.consistent(solve, state.torn, None, None, 1e-6)
+        slip_dependence.FrictionBySlip().solve(Passes(solve, None), state.torn, None, 1e-6)
     assert "slip pass 3" in error.value.history[-1].note or len(error.value.history) > 3
 
 

@@ -1,0 +1,74 @@
+"""What is solved again until it agrees with the solution: fronts of fluids, friction by slip."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from typing import Protocol
+
+import numpy as np
+
+from fenics_contact._equilibrium.passes import Passes, Solve
+from fenics_contact._scene.scene import Scene
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
+
+
+class OuterLoop(Protocol):
+    """An iteration around the dual solver; every pass of it is a solution."""
+
+    #: What its history is that of, in words.
+    name: str
+
+    def require_derivatives(self, torn: TornSystem, before: State | None) -> None:
+        """Reject systems, and load steps before, with which no derivatives by the shape are known."""
+
+    def pass_tolerance(self, wanted: float) -> float:
+        """Return how accurately each pass is solved."""
+
+    def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
+        """Repeat solutions until both agree, from where a state left this loop. Collective."""
+
+    def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
+        """Return the arrays from which it is restored."""
+
+    def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
+        """Return a system with what was stored. Collective."""
+
+
+def outer_loops(scene: Scene) -> list[OuterLoop]:
+    """Return those that a scene calls for, the innermost first."""
+    loops: list[OuterLoop] = []
+    if any(pair.fluid is not None for pair in scene.contacts):
+        from fenics_contact._equilibrium.penetration import FluidFront
+
+        loops.append(FluidFront())
+    if any(pair.slip_table is not None for pair in scene.contacts):
+        from fenics_contact._equilibrium.slip_dependence import FrictionBySlip
+
+        loops.append(FrictionBySlip())
+    return loops
+
+
+def nested(
+    loops: Sequence[OuterLoop],
+    solve: Solve,
+    known: LinearState | None,
+    before: State | None,
+    tolerance: float,
+) -> Solve:
+    """Return the solution of a system inside all loops.
+
+    `known`: state from which the first passes start; `before`: at the end of the load step before;
+    `tolerance`: largest relative change in the last passes.
+    """
+
+    def around(inner: Solve, loop: OuterLoop) -> Solve:
+        def solved(torn: TornSystem, last: LinearState | None) -> LinearState:
+            # In later passes of a loop outside, it goes on from where the pass before left it.
+            return loop.solve(Passes(inner, last), torn, before if last is known else last, tolerance)
+
+        return solved
+
+    return reduce(around, loops, solve)
