@@ -78,7 +78,7 @@ class _Slave:
         self.place = np.searchsorted(self.nodes, torn.points.slave[self.mine])
         hanging = torn.scene.bodies[pair.slave.body].mesh.hanging
         known = np.isin(np.arange(len(self.nodes)), self.place)
-        self._fill = None if hanging is None else hanging.filled(self.surface.nodes, known)
+        self._fill = hanging.filled(self.surface.nodes, known)
 
     def at_nodes(self, values: np.ndarray) -> np.ndarray:
         """Return values of all contact points at the nodes of the surface, zero at others, (n_nodes, ...).
@@ -87,7 +87,7 @@ class _Slave:
         """
         result = np.zeros((len(self.nodes), *values.shape[1:]))
         result[self.place] = values[self.mine]
-        return result if self._fill is None else np.asarray(self._fill @ result)
+        return np.asarray(self._fill @ result)
 
     def facets(self, state: LinearState, weight: np.ndarray) -> np.ndarray:
         """Return this rank's share of the facets all of whose nodes have points, and one of them a weight."""

@@ -36,8 +36,7 @@ def way_to_images(mesh: BodyMesh) -> np.ndarray:
     shares = np.column_stack([missing, size, areas])[curved] / count
     sums = np.zeros((mesh.n_nodes, shares.shape[1]))
     np.add.at(sums, facets[curved], shares[:, None])
-    if mesh.hanging is not None:
-        sums = mesh.hanging.followed(mesh.n_nodes).T @ sums
+    sums = mesh.hanging.followed(mesh.n_nodes).T @ sums
     length, there = np.linalg.norm(sums[:, 2:], axis=1), sums[:, 1] > 0.0
     way = np.zeros_like(mesh.points)
     way[there] = (sums[there, 0] / sums[there, 1] / length[there])[:, None] * sums[there, 2:]
@@ -52,15 +51,13 @@ def way_to_images(mesh: BodyMesh) -> np.ndarray:
     return way
 
 
-def _rims(edges: np.ndarray, hanging: HangingNodes | None) -> np.ndarray:
+def _rims(edges: np.ndarray, hanging: HangingNodes) -> np.ndarray:
     """Return the edges of only one facet, shape (n, 2), but for those of larger facets that were halved.
 
     `edges`: ends of those of all facets, shape (n_facets, 3 | 4, 2).
     """
     known, times = np.unique(np.sort(edges.reshape(-1, 2), axis=1), axis=0, return_counts=True)
     rim = known[times == 1]
-    if hanging is None:
-        return rim
     ends = np.unique(np.sort(hanging.masters, axis=1)[:, [0, -1]], axis=0)
     halved = (match_faces(rim, ends) >= 0) | np.isin(rim, hanging.nodes).any(axis=1)
     return rim[~halved]

@@ -269,7 +269,7 @@ class CoarseStart:
             nodal = np.zeros((self.state.scene.bodies[body].mesh.n_nodes, traction.shape[1]))
             nodal[nodes - before] = values
             mesh = self.state.scene.bodies[body].mesh
-            if mesh.hanging is not None:
+            if mesh.hanging:
                 nodal = mesh.hanging.filled_in(nodal, mesh.surfaces[pair.slave.name], nodes - before)
             forces[mine] = self._to_fine(torn.scene, body, nodal)[points.slave[mine] - first]
         forces *= points.area[:, None]

@@ -244,7 +244,7 @@ def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
     stiffness = {}
     for name, body in scene.bodies.items():
         mesh = body.mesh
-        volume = mesh.volume / mesh.n_cells if mesh.hanging is None else cell_volumes(mesh.points, mesh.cells)
+        volume = cell_volumes(mesh.points, mesh.cells) if mesh.hanging else mesh.volume / mesh.n_cells
         size = volume ** (1.0 / scene.dim)
         cell_type = body.cell_type
         moduli = np.array([forms.typical_modulus(material, cell_type) for material in body.materials])

@@ -416,10 +416,10 @@ class Equations:
             moved = (at.displacement[part] for part in self.decomposition.parts)
             responses = tuple(map(_on_bed, responses, self._beds, moved))
             external, softening = load.at(at.displacement)
-            if (follow := self.decomposition.following) is not None:
-                responses = tuple(map(_following, responses, self.decomposition.meshes))
-                external = follow.T @ external
-                softening = None if softening is None else (follow.T @ softening @ follow).tocsr()
+            responses = tuple(map(_following, responses, self.decomposition.meshes))
+            follow = self.decomposition.following
+            external = follow.T @ external
+            softening = None if softening is None else (follow.T @ softening @ follow).tocsr()
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
         # What is no more than rounding of strains and of positions is none.
@@ -463,8 +463,6 @@ class _OfSeveralShapes:
 def _following(response: Response, mesh: SubdomainMesh) -> Response:
     """Return a response to the displacement of nodes that do not hang."""
     following = mesh.following
-    if following is None:
-        return response
     return replace(response, force=following.force(response.force)).with_matrices(following.stiffness)
 
 

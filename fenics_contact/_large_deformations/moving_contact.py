@@ -484,7 +484,7 @@ class MovingContact(Contact):
         ]
         for side in surfaces:
             hanging = scene.bodies[side.body].mesh.hanging
-            if hanging is not None and np.isin(hanging.nodes, scene.facets(side)).any():
+            if np.isin(hanging.nodes, scene.facets(side)).any():
                 raise InvalidInputError(
                     "contact of bodies that deform much needs surfaces without hanging nodes, but "
                     f"{side.name!r} of body {side.body!r} has some: refine all cells at that surface"

@@ -29,7 +29,7 @@ def on_masters(points: ContactPoints, scene: Scene, body: str, means: bool) -> C
     followed = followed_nodes(scene)
     points = replace(points, master=(points.master @ followed).tocsr())
     hanging, numbers = scene.bodies[body].mesh.hanging, NodeNumbers.of(scene)
-    if hanging is None:
+    if not hanging:
         return points
     point_of = np.full(numbers.n_nodes, -1)
     point_of[points.slave] = np.arange(points.count)
@@ -82,8 +82,5 @@ def _shares(leaving: np.ndarray, there: np.ndarray, count: int) -> sp.csr_matrix
 def followed_nodes(scene: Scene) -> sp.csr_matrix:
     """Return T on the nodes of all bodies, dependent ones by their masters'."""
     meshes = [body.mesh for body in scene.bodies.values()]
-    parts = [
-        sp.identity(mesh.n_nodes) if mesh.followers is None else mesh.followers.followed(mesh.n_nodes)
-        for mesh in meshes
-    ]
+    parts = [mesh.followers.followed(mesh.n_nodes) for mesh in meshes]
     return sp.block_diag(parts, format="csr")

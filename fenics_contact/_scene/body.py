@@ -192,7 +192,7 @@ def _check_regions(mesh: BodyMesh, materials: Mapping[str, Material]) -> None:
 
 
 def _check_integration(mesh: BodyMesh, integration: str) -> None:
-    if integration == "reduced" and mesh.centres is None:
+    if integration == "reduced" and not mesh.centres:
         raise InvalidInputError(
             "reduced integration needs hexahedra of 20 or quadrilaterals of 8 nodes, got "
             f"{mesh.cells_in_words}, which deform without energy by it: leave it out, or take "

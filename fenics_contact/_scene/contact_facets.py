@@ -31,7 +31,7 @@ def with_free_centres(scene: SceneParts) -> Mapping[str, Body]:
     """Return the bodies of a scene, the centres of facets in contact or tied as unknowns."""
     bodies = dict(scene.bodies)
     for name, body in scene.bodies.items():
-        if body.mesh.centres is None:
+        if not body.mesh.centres:
             continue
         sides = (side for pair in (*scene.contacts, *scene.ties) for side in _pressed(pair))
         touching = tuple(

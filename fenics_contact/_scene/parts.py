@@ -453,7 +453,7 @@ class SceneParts:
     @property
     def has_hanging_nodes(self) -> bool:
         """Whether nodes of some body hang on edges or faces of larger cells."""
-        return any(body.mesh.hanging is not None for body in self.bodies.values())
+        return any(body.mesh.hanging for body in self.bodies.values())
 
     def has_meshes_of(self, other: SceneParts) -> bool:
         """Return whether its bodies have the very meshes of those of another scene."""

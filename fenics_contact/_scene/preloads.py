@@ -171,8 +171,6 @@ class Preload:
     def held_pairs(self, mesh: BodyMesh) -> np.ndarray:
         """Return the nodes behind and before the section that are unknowns, shape (n, 2)."""
         pairs = self.cut(mesh).pairs
-        if mesh.centres is None:
-            return pairs
         return pairs[~np.isin(pairs, mesh.centres.nodes).any(axis=1)]
 
     def normal(self, mesh: BodyMesh) -> np.ndarray:

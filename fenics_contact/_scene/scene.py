@@ -79,7 +79,7 @@ class Scene(SceneParts):
             object.__setattr__(self, "bodies", with_cuts(self))
         require_preloads(self)
         require_terms(self.constraints, self.bodies)
-        if any(body.mesh.centres is not None for body in self.bodies.values()):
+        if any(body.mesh.centres for body in self.bodies.values()):
             object.__setattr__(self, "bodies", with_free_centres(self))
         object.__setattr__(self, "contacts", Pairs(with_discretisation(self, self.contacts)))
         object.__setattr__(self, "ties", with_discretisation(self, self.ties))

@@ -53,7 +53,7 @@ def _sharp(mesh: BodyMesh, nodes: np.ndarray, cuts: np.ndarray) -> np.ndarray:
     cells = mesh.linear.cells
     marked = np.zeros(mesh.n_nodes, dtype=bool)
     marked[nodes] = True
-    if mesh.hanging is None:
+    if not mesh.hanging:
         # All cells at a node are among these, so that no face with a node of the surface seems to be outside.
         cells = cells[marked[cells].any(axis=1)]
     faces, _ = boundary_faces(cells, mesh.dim, mesh.hanging)

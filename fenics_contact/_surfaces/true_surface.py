@@ -362,7 +362,7 @@ def true_surface(
     marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks, planes)
     surface = _with_areas(surface, mesh, name, axisymmetric)
-    if mesh.hanging is not None:
+    if mesh.hanging:
         none = np.zeros(len(surface.nodes), dtype=bool)
         surface = replace(surface, followed=mesh.hanging.filled(surface.nodes, none))
     order = 2
@@ -402,7 +402,7 @@ def _relief(
     order: int,
 ) -> Relief | None:
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], *mirrors)
-    hangs = None if mesh.hanging is None else np.isin(surface.nodes, mesh.hanging.nodes)
+    hangs = np.isin(surface.nodes, mesh.hanging.nodes)
     raised = reconstructed(surface, order) if shape is None else by_shape(surface, shape, hangs)
     return None if is_flat(raised) else raised.relief
 

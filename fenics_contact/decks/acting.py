@@ -291,8 +291,7 @@ class Acting:
         for name, mesh in self.model.parts.meshes.items():
             nodes = self.model.parts.nodes[name]
             change = (temperatures - self.model.history.initial)[nodes]
-            if mesh.centres is not None:
-                change[mesh.centres.nodes] = (mesh.centres.given * change[mesh.centres.masters]).sum(axis=1)
+            change = mesh.centres.placed(change)
             materials = bodies[name].materials
             if not change.any() or not all(getattr(m, "expands", False) for m in materials):
                 continue

@@ -192,7 +192,7 @@ class Model:
             material = given if len(given) > 1 else next(iter(given.values()))
             integration = integration_of(self.mesh, part, self.note)
             self._note_corners(part, mesh)
-            if mesh.centres is None:
+            if not mesh.centres:
                 integration = "full"
             revolved = self.kind == "axisymmetric"
             bodies[part.name] = Body(mesh, material, axisymmetric=revolved, integration=integration)

@@ -285,8 +285,8 @@ def solve_adjoint(
     less accurate state saves most products. By default the multiplier of the state.
     """
     system = state.dual
-    if (follow := state.torn.decomposition.following) is not None:
-        partials = replace(partials, by_displacement=follow.T @ partials.by_displacement)
+    follow = state.torn.decomposition.following
+    partials = replace(partials, by_displacement=follow.T @ partials.by_displacement)
     _require_held(system, partials.by_displacement)
     problem, face, factor = _scaled(system.problem, linearised.face)
     task = Task("adjoint", unit="products")

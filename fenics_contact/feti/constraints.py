@@ -233,7 +233,7 @@ def _equations(scene: Scene, tearing: Tearing) -> tuple[sp.csr_matrix, np.ndarra
         first.append(first[-1] + 1 + max(int(each.equation.max()) for each in entries))
     value, row, dof = (np.concatenate(part) for part in zip(*parts, strict=True))
     matrix = sp.csr_matrix((value, (row, dof)), shape=(first[-1], tearing.n_nodes * width))
-    if any(body.mesh.followers is not None for body in scene.bodies.values()):
+    if any(body.mesh.followers for body in scene.bodies.values()):
         matrix = matrix @ sp.kron(followed_nodes(scene), sp.identity(width))
     return _cleaned(matrix.tocsr(), _lengths(matrix)), np.array(first)
 

@@ -116,7 +116,7 @@ def tear(
             # One integer key per node and subdomain: keys in their order are those of copies.
             keys.append((nodes + node_offset[index]) * total + subdomain_offset[index] + number)
             # Beside cells of another size the number of cells counts as well: a fifth fewer products.
-            sums.append(added / (times if mesh.hanging is None else 2**scene.dim))
+            sums.append(added / (2**scene.dim if mesh.hanging else times))
     key, stiff = np.concatenate(keys), np.concatenate(sums)
     order = np.argsort(key)
     key, stiff = key[order], stiff[order]
@@ -303,7 +303,7 @@ def gluing_rows(
     tearing: Tearing,
     fixed: np.ndarray,
     axes: LocalAxes | None = None,
-    dependent: np.ndarray | None = None,
+    dependent: Sequence[int] | np.ndarray = (),
     rank: int | None = None,
 ) -> GluingRows:
     """Build the equality rows B_E u = c_E, for which B_E D⁻¹ B_Eᵀ is diagonal, D the stiffness of copies.
@@ -320,8 +320,7 @@ def gluing_rows(
     here |= tearing.subdomain_rank[tearing.copy_subdomain] == rank
     touched = np.logical_or.reduceat(here, tearing.first_copy[:-1])[:, None]
     multiplicity = tearing.multiplicity.copy()
-    if dependent is not None:
-        multiplicity[dependent] = 1
+    multiplicity[np.asarray(dependent, dtype=np.int64)] = 1
     counts = np.where(fixed, multiplicity[:, None], multiplicity[:, None] - 1)
     start = np.concatenate([[0], np.cumsum(counts.ravel())])
     parts = [_prescribed_entries(tearing, fixed & touched, start)]
@@ -423,14 +422,10 @@ class Decomposition:
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
     @cached_property
-    def following(self) -> sp.csr_matrix | None:
-        """T on this rank's torn vectors: dependent nodes at the displacement of others; None without any."""
-        if all(mesh.following is None for mesh in self.meshes):
-            return None
-        parts = [
-            sp.identity(mesh.size) if mesh.following is None else mesh.following.means for mesh in self.meshes
-        ]
-        return sp.csr_matrix(sp.block_diag(parts))
+    def following(self) -> sp.csr_matrix:
+        """T on this rank's torn vectors: dependent nodes at the displacement of others."""
+        means = [mesh.following.means for mesh in self.meshes]
+        return sp.csr_matrix(sp.block_diag([sp.csr_matrix((0, 0)), *means]))
 
     @cached_property
     def held(self) -> tuple[np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ what hangs on them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -35,16 +36,14 @@ class Following:
     apart: sp.csr_matrix
 
     @classmethod
-    def of(cls, mesh: BodyMesh, nodes: np.ndarray, components: int) -> Following | None:
-        """Return those among the nodes of a subdomain, given by block; None without any."""
+    def of(cls, mesh: BodyMesh, nodes: np.ndarray, components: int) -> AnyFollowing:
+        """Return those among the nodes of a subdomain, given by block."""
         followers = mesh.followers
-        if followers is None:
-            return None
         block = np.full(mesh.n_nodes, -1)
         block[nodes] = np.arange(len(nodes))
         here = block[followers.nodes] >= 0
         if not here.any():
-            return None
+            return NoneFollow(components * len(nodes))
         own, masters = block[followers.nodes[here]], block[followers.masters[here]]
         assert (masters >= 0).all()  # siblings are kept together
         count, width = masters.shape
@@ -56,9 +55,9 @@ class Following:
         means = sp.identity(size) - chosen.T @ apart
         return cls(sp.kron(means, every, format="csr"), sp.kron(apart, every, format="csr"))
 
-    def same_as(self, other: Following | None) -> bool:
+    def same_as(self, other: AnyFollowing) -> bool:
         """Return whether the same nodes of another subdomain, numbered alike, follow the same others."""
-        if other is None or self.apart.shape != other.apart.shape:
+        if self.apart.shape != other.apart.shape:
             return False
         return bool((self.apart != other.apart).nnz == 0)
 
@@ -72,10 +71,43 @@ class Following:
         return np.asarray(self.means.T @ force)
 
 
-def dependent_nodes(scene: Scene, numbers: NodeNumbers) -> np.ndarray | None:
-    """Return the numbers of the dependent nodes of all bodies, shape (n,); None without any."""
+@dataclass(frozen=True)
+class NoneFollow:
+    """A subdomain all of whose nodes are unknowns.
+
+    Attributes:
+        size: Number of these, n.
+    """
+
+    size: int
+
+    @property
+    def means(self) -> sp.csr_matrix:
+        """T, shape (n, n)."""
+        return sp.identity(self.size, format="csr")
+
+    @property
+    def apart(self) -> sp.csr_matrix:
+        """C, shape (0, n)."""
+        return sp.csr_matrix((0, self.size))
+
+    def same_as(self, other: AnyFollowing) -> bool:
+        """Return whether no node of another subdomain follows others, either."""
+        return not other.apart.shape[0]
+
+    def stiffness(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
+        """Return K itself."""
+        return matrix
+
+    def force(self, force: np.ndarray) -> np.ndarray:
+        """Return f itself."""
+        return force
+
+
+AnyFollowing: TypeAlias = Following | NoneFollow
+
+
+def dependent_nodes(scene: Scene, numbers: NodeNumbers) -> np.ndarray:
+    """Return the numbers of the dependent nodes of all bodies, shape (n,)."""
     followers = {name: scene.bodies[name].mesh.followers for name in numbers.body_names}
-    found = [
-        numbers.global_nodes(name, each.nodes) for name, each in followers.items() if each is not None
-    ]
-    return np.concatenate(found) if found else None
+    return np.concatenate([numbers.global_nodes(name, each.nodes) for name, each in followers.items()])

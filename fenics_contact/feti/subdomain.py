@@ -25,7 +25,7 @@ from fenics_contact._scene.loads import InitialStress, Load, PointForce, Surface
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
-from fenics_contact.feti.following import Following
+from fenics_contact.feti.following import AnyFollowing, Following
 from fenics_contact.feti.foundations import foundation_stiffness, separated
 from fenics_contact.feti.nearby import Nearby
 from fenics_contact.materials.elastic import Material
@@ -125,7 +125,7 @@ class SubdomainMesh:
         space: dolfinx function space of displacements on a mesh of its own, or one that subdomains with cells
             connected alike share: nodes are where who assembled last has moved them.
         facets: Surface of the body -> (cells, local facets) on this mesh; `facets_of` adds to it.
-        following: Its dependent nodes; None without any.
+        following: Its dependent nodes.
         expanded: How cells of several shapes are hexahedra; None where they are of one shape.
     """
 
@@ -135,7 +135,7 @@ class SubdomainMesh:
     nodes: np.ndarray
     space: _dolfinx.fem.FunctionSpace
     facets: dict[str, tuple[np.ndarray, np.ndarray]]
-    following: Following | None = None
+    following: AnyFollowing
     expanded: Expanded | None = None
 
     def by_input_node(self, values: np.ndarray) -> np.ndarray:
@@ -273,15 +273,10 @@ class Assembled:
         room = shape.size * rounding
         for other in self._known[id(mesh.space)].near(float(np.abs(shape).sum()), room):
             apart = np.abs(_from_own_origin(other.points) - shape).max()
-            if apart <= rounding and other.material.same_as(parts) and _follow_alike(mesh, other.mesh):
+            follow_alike = mesh.following.same_as(other.mesh.following)
+            if apart <= rounding and other.material.same_as(parts) and follow_alike:
                 return other
         return None
-
-
-def _follow_alike(mesh: SubdomainMesh, other: SubdomainMesh) -> bool:
-    if mesh.following is None:
-        return other.following is None
-    return mesh.following.same_as(other.following)
 
 
 def cut_out(
@@ -373,9 +368,7 @@ def assemble(
             form = forms.load(load, parts, body.cell_type, mesh.space, places, on, acted, cells, of_cells)
             force += thickness * mesh.force_of(_dolfinx.assemble_vector(form))
     _check_finite(force, mesh)
-    if mesh.following is not None:
-        force = mesh.following.force(force)
-    return replace(earlier, loads=acting, load=force)
+    return replace(earlier, loads=acting, load=mesh.following.force(force))
 
 
 _Facets: TypeAlias = tuple[np.ndarray, np.ndarray] | None
@@ -454,7 +447,7 @@ def _with_stiffness(
         if isinstance(body, ToolBody) and body.springs:
             return (elastic + sp.csr_matrix(body.spring_matrix(points))).tocsr()
         whole = (elastic + bed).tocsr() if bed.nnz else elastic
-        return whole if mesh.following is None else mesh.following.stiffness(whole)
+        return mesh.following.stiffness(whole)
 
     bed = foundation_of(mesh, body, foundations)
     matrix = CachedMatrix(stiffness)

@@ -92,7 +92,7 @@ def meeting_points(
     if scene.springs:
         with together(comm):
             ends = spring_points(scene, tearing)
-            if any(body.mesh.followers is not None for body in scene.bodies.values()):
+            if any(body.mesh.followers for body in scene.bodies.values()):
                 from fenics_contact._pairing.following import means_on_masters
 
                 ends = means_on_masters(ends, scene)

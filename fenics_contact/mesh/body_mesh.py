@@ -26,7 +26,14 @@ from fenics_contact.mesh.faces import (
     check_no_coincident_nodes,
     coordinate_rounding,
 )
-from fenics_contact.mesh.hanging import Centres, DependentNodes, HangingNodes, nodes_to_hold
+from fenics_contact.mesh.hanging import (
+    NO_CENTRES,
+    NO_HANGING,
+    Centres,
+    DependentNodes,
+    HangingNodes,
+    nodes_to_hold,
+)
 from fenics_contact.mesh.linear_facets import has_both, linear_facets
 from fenics_contact.mesh.quadratic_nodes import check_node_order
 from fenics_contact.mesh.quality import (
@@ -205,9 +212,11 @@ def check_hanging(hanging: HangingNodes, points: np.ndarray, n_cells: int) -> No
 
     `points`: coordinates, (n_nodes, 3 | 2).
     """
+    if not hanging:
+        return
     nodes, masters, levels = hanging.nodes, hanging.masters, hanging.levels
     shape = (len(nodes), 2 ** (points.shape[1] - 1))
-    if masters.shape != shape or levels.shape != (n_cells,) or np.any(np.diff(nodes) <= 0) or not len(nodes):
+    if masters.shape != shape or levels.shape != (n_cells,) or np.any(np.diff(nodes) <= 0):
         raise InvalidInputError(
             f"hanging must have nodes in ascending order, masters of shape {shape} and a level for each of "
             f"{n_cells} cells, got {len(nodes)} nodes, masters {masters.shape} and levels {levels.shape}: "
@@ -310,10 +319,10 @@ class BodyMesh:
     regions: Mapping[str, np.ndarray] = field(default_factory=dict)
     coincident_nodes: bool = False
     shapes: Mapping[str, SurfaceShape] = field(default_factory=dict)
-    hanging: HangingNodes | None = None
+    hanging: HangingNodes = NO_HANGING
     chart: Chart | None = None
     node_sets: Mapping[str, np.ndarray] = field(default_factory=dict)
-    centres: Centres | None = None
+    centres: Centres = NO_CENTRES
     _origin: BodyMesh | None = field(default=None, init=False, repr=False)
     _off_shapes: Mapping[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
     _cuts: Mapping[Hashable, Cut] = field(default_factory=dict, init=False, repr=False)
@@ -338,10 +347,8 @@ class BodyMesh:
             raise
         if not self.coincident_nodes:
             check_no_coincident_nodes(points)
-        if self.hanging is not None:
-            check_hanging(self.hanging, points, len(cells))
-        if self.centres is not None:
-            check_centres(self.centres, points)
+        check_hanging(self.hanging, points, len(cells))
+        check_centres(self.centres, points)
         self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape, hanging=self.hanging))
         self._set(node_sets=checked_node_sets(self.node_sets, len(points), self.surfaces))
         self._set(_off_shapes=self._checked_shapes(self.shapes))
@@ -353,17 +360,15 @@ class BodyMesh:
             object.__setattr__(self, name, value)
 
     def _checked_shapes(self, shapes: Mapping[str, SurfaceShape]) -> dict[str, np.ndarray]:
-        return check_shapes(
-            self.points, self.surfaces, shapes, None if self.followers is None else self.followers.nodes
-        )
+        return check_shapes(self.points, self.surfaces, shapes, self.followers.nodes)
 
     def _facts(self) -> dict[str, Any]:
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         return {
             "cells": self.cells_in_words,
             "nodes": self.n_nodes,
-            **({} if self.hanging is None else {"hanging nodes": len(self.hanging.nodes)}),
-            **({} if self.centres is None else {"centres that follow": len(self.centres.nodes)}),
+            **({"hanging nodes": len(self.hanging.nodes)} if self.hanging else {}),
+            **({"centres that follow": len(self.centres.nodes)} if self.centres else {}),
             "extent": " × ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True)),
             "surfaces": _sizes(self.surfaces),
             "regions": _sizes(self.regions),
@@ -376,8 +381,8 @@ class BodyMesh:
         """Number and type of the cells: "24 hexahedra"."""
         plural = cell_type_of(self.cells, self.dim).plural
         if self.has_several_shapes:
-            return in_words(self.cells, self.dim, self.centres is not None)
-        return f"{self.n_cells} {plural if self.centres is None else plural.replace(*_FOLLOWING)}"
+            return in_words(self.cells, self.dim, bool(self.centres))
+        return f"{self.n_cells} {plural.replace(*_FOLLOWING) if self.centres else plural}"
 
     @property
     def has_several_shapes(self) -> bool:
@@ -399,9 +404,9 @@ class BodyMesh:
         return values if matrix is None else np.asarray(matrix @ values[: self.n_nodes])
 
     @property
-    def followers(self) -> DependentNodes | None:
-        """The nodes that are no unknowns of their own, `hanging` ones or `centres`; None without any."""
-        return self.hanging if self.centres is None else self.centres
+    def followers(self) -> DependentNodes:
+        """The nodes that are no unknowns of their own, `hanging` ones or `centres`."""
+        return self.centres or self.hanging
 
     @property
     def cell_type(self) -> str:
@@ -550,7 +555,7 @@ class BodyMesh:
 
     def _at(self, points: np.ndarray) -> BodyMesh:
         new_points = checked_points(self._on_both_sides(points), self.points.shape)
-        if self.followers is not None:
+        if self.followers:
             new_points = checked_points(self.followers.placed(new_points))
         check_jacobians(
             new_points,

@@ -11,7 +11,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.mesh.faces import boundary_faces
-from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 from fenics_contact.mesh.quality import thickness
 
 
@@ -102,7 +102,7 @@ def kept_valid(
     straight: np.ndarray,
     cells: np.ndarray,
     surfaces: Iterable[np.ndarray],
-    hanging: HangingNodes | None = None,
+    hanging: HangingNodes = NO_HANGING,
     least: float = 0.1,
 ) -> np.ndarray:
     """Return the images of nodes, but nearer to straight positions where cells would be nearly inverted.
@@ -121,19 +121,17 @@ def kept_valid(
     turn[boundary_faces(cells, points.shape[1], hanging)[0]] = 1
     for facets in surfaces:
         turn[facets] = 2
-    if hanging is not None:
-        turn[hanging.nodes] = 3  # they follow
+    turn[hanging.nodes] = 3  # they follow
     while len(worse):
         nodes = cells[worse].ravel()
-        if hanging is not None:
-            nodes = np.append(nodes, hanging.masters[np.isin(hanging.nodes, nodes)])
+        nodes = np.append(nodes, hanging.masters[np.isin(hanging.nodes, nodes)])
         nodes = np.unique(nodes[(share[nodes] > 0.0) & (turn[nodes] < 3)])
         if not len(nodes):
             break
         nodes = nodes[turn[nodes] == turn[nodes].min()]
         share[nodes] = np.where(share[nodes] > 0.2, 0.5 * share[nodes], 0.0)
         points = straight + share[:, None] * (images - straight)
-        points = points if hanging is None else hanging.placed(points)
+        points = hanging.placed(points)
         worse = np.flatnonzero(thickness(points, cells) < thin)
     return points
 

@@ -17,7 +17,7 @@ from fenics_contact.mesh.faces import (
     start_at_smallest,
     widened,
 )
-from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 
 
 def integers(values: ArrayLike, name: str) -> np.ndarray:
@@ -47,7 +47,7 @@ def checked_surfaces(
     n_nodes: int,
     dim: int,
     *,
-    hanging: HangingNodes | None = None,
+    hanging: HangingNodes = NO_HANGING,
 ) -> dict[str, np.ndarray]:
     """Return named facets, (n_facets, nodes of a facet) int64, outward boundary faces of the cells."""
     checked: dict[str, np.ndarray] = {}

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fenics_contact.mesh.body_mesh import BodyMesh, Cut
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces, neighbours, shared_faces
-from fenics_contact.mesh.hanging import Centres, require_none
+from fenics_contact.mesh.hanging import NO_CENTRES, Centres, require_none
 from fenics_contact.mesh.serendipity_cells import centres_of
 
 
@@ -57,11 +57,9 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
     return result
 
 
-def _centres(mesh: BodyMesh, cells: np.ndarray, node: np.ndarray) -> Centres | None:
+def _centres(mesh: BodyMesh, cells: np.ndarray, node: np.ndarray) -> Centres:
     """Return the centres of new cells that followed in a mesh, given the old node of each new one."""
-    found = None if mesh.centres is None else centres_of(cells, mesh.dim)
-    if mesh.centres is None or found is None:
-        return None
+    found = centres_of(cells, mesh.dim) if mesh.centres else NO_CENTRES
     return found.without(found.nodes[~np.isin(node[found.nodes], mesh.centres.nodes)])
 
 

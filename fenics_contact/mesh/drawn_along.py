@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from fenics_contact.mesh.cell_types import cell_type_of
-from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 
 
 def drawn_along(
@@ -15,7 +15,7 @@ def drawn_along(
     straight: np.ndarray,
     cells: np.ndarray,
     along: np.ndarray,
-    hanging: HangingNodes | None = None,
+    hanging: HangingNodes = NO_HANGING,
     iterations: int = 100,
 ) -> np.ndarray:
     """Return displacements of all nodes for those of the nodes that were put on shapes.
@@ -30,7 +30,7 @@ def drawn_along(
     follow their masters.
     """
     joined = _joined(cells, straight)
-    if hanging is not None:
+    if hanging:
         follow = hanging.followed(len(straight))
         joined = csr_matrix(follow.T @ joined @ follow)
     joined, along = joined[free], along[free]

@@ -53,7 +53,7 @@ def equal_boxes(
         (n_cells,) numbers of the boxes as `box_partition` gives them; None where there are no such boxes.
     """
     first, last = max(least, members, target / near), near * target
-    if mesh.grid is None or mesh.hanging is not None or mesh.cuts or first > last:
+    if mesh.grid is None or mesh.hanging or mesh.cuts or first > last:
         return None
     counts = mesh.grid.max(axis=0) + 1
     if len(np.unique(np.ravel_multi_index(tuple(mesh.grid.T), tuple(counts)))) < counts.prod():

@@ -13,8 +13,6 @@ Cells of four nodes are tetrahedra unless ``dim=2``.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -23,9 +21,7 @@ from scipy.spatial import cKDTree
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
 from fenics_contact.mesh.collapsed import has_collapsed
-
-if TYPE_CHECKING:
-    from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 
 LAST_BITS = 8.0
 """A rotated and shifted coordinate is off by a few units in the last place; a difference by twice as many."""
@@ -283,7 +279,7 @@ def in_columns(values: np.ndarray, width: int) -> np.ndarray:
 
 
 def boundary_faces(
-    cells: np.ndarray, dim: int = 3, hanging: HangingNodes | None = None
+    cells: np.ndarray, dim: int = 3, hanging: HangingNodes = NO_HANGING
 ) -> tuple[np.ndarray, np.ndarray]:
     """Extract the faces that belong to only one cell.
 
@@ -297,7 +293,7 @@ def boundary_faces(
     """
     numbers = _numbers_of_faces(cells, dim)
     single = np.setdiff1d(np.flatnonzero(np.bincount(numbers)[numbers] == 1), flat_faces(cells, dim))
-    if hanging is not None:
+    if hanging:
         small, large = _on_larger(_faces_at(cells, dim, single), hanging)
         single = np.delete(single, np.concatenate([small, large]))
     return _faces_at(cells, dim, single), single // len(cell_type_of(cells, dim).faces)
@@ -325,7 +321,7 @@ def _on_larger(faces: np.ndarray, hanging: HangingNodes) -> tuple[np.ndarray, np
 
 
 def shared_faces(
-    cells: np.ndarray, dim: int = 3, hanging: HangingNodes | None = None
+    cells: np.ndarray, dim: int = 3, hanging: HangingNodes = NO_HANGING
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the faces that two cells share; where cells have different sizes, those of the smaller ones.
 
@@ -342,7 +338,7 @@ def shared_faces(
     order = np.argsort(numbers, kind="stable")
     order = order[counts[numbers[order]] == 2]
     found, pairs = _faces_at(cells, dim, order[::2]), (order // of_cell).reshape(-1, 2)
-    if hanging is not None:
+    if hanging:
         single = np.flatnonzero(counts[numbers] == 1)
         chosen = _faces_at(cells, dim, single)
         small, large = _on_larger(chosen, hanging)
@@ -351,7 +347,7 @@ def shared_faces(
     return found, pairs
 
 
-def neighbours(cells: np.ndarray, dim: int = 3, hanging: HangingNodes | None = None) -> np.ndarray:
+def neighbours(cells: np.ndarray, dim: int = 3, hanging: HangingNodes = NO_HANGING) -> np.ndarray:
     """Find the pairs of cells that share a face, (n, 2); arguments and errors as in `shared_faces`."""
     return shared_faces(cells, dim, hanging)[1]
 
@@ -370,7 +366,7 @@ def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
 
 
 def orient(
-    cells: np.ndarray, facets: np.ndarray, dim: int = 3, hanging: HangingNodes | None = None
+    cells: np.ndarray, facets: np.ndarray, dim: int = 3, hanging: HangingNodes = NO_HANGING
 ) -> np.ndarray:
     """Return boundary facets in the cells' order: cyclic and outward.
 

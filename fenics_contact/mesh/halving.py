@@ -10,7 +10,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, CellType
 from fenics_contact.mesh.chart import Chart
 from fenics_contact.mesh.faces import match_faces, number_faces
-from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 from fenics_contact.mesh.on_shapes import on_shapes, with_parts
 from fenics_contact.mesh.quality import thickness
 from fenics_contact.shapes.simple import SurfaceShape
@@ -50,7 +50,7 @@ class Parts:
     points: np.ndarray
     cells: np.ndarray
     surfaces: dict[str, np.ndarray]
-    hanging: HangingNodes | None
+    hanging: HangingNodes
     chart: Chart | None
     parents: np.ndarray
     positions: np.ndarray
@@ -59,7 +59,7 @@ class Parts:
     @classmethod
     def of(cls, mesh: BodyMesh, kind: CellType, chosen: np.ndarray) -> Parts:
         """Halve chosen cells, and those that are two levels larger beside them."""
-        levels = np.zeros(mesh.n_cells, dtype=np.int64) if mesh.hanging is None else mesh.hanging.levels
+        levels = mesh.hanging.levels if mesh.hanging else np.zeros(mesh.n_cells, dtype=np.int64)
         split = _balanced(mesh, kind, levels, chosen)
         large, small = np.flatnonzero(split), np.flatnonzero(~split)
         between, number = _new_nodes(mesh, kind, large)
@@ -84,7 +84,7 @@ class Parts:
     def beside_inverted(self, kind: CellType) -> np.ndarray:
         """Return the coarse cells that were not halved on which nodes of inverted cells hang."""
         inverted = thickness(self.points, self.cells) <= 0.0
-        if self.hanging is None or not inverted.any():
+        if not self.hanging or not inverted.any():
             return np.zeros(0, dtype=np.int64)
         mine = np.isin(self.hanging.nodes, self.cells[inverted])
         there = _entities(kind, self.cells)
@@ -114,7 +114,7 @@ def _corner_weights(kind: CellType) -> np.ndarray:
 def _balanced(mesh: BodyMesh, kind: CellType, levels: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Mark the chosen cells, and others until those that share a point differ by one level, (n_cells,)."""
     cell, node = np.repeat(np.arange(mesh.n_cells), mesh.cells.shape[1]), mesh.cells.ravel()
-    if mesh.hanging is not None:  # larger cells touch the nodes that hang on them
+    if mesh.hanging:  # larger cells touch the nodes that hang on them
         there = _entities(kind, mesh.cells)
         which = match_faces(there.reshape(-1, there.shape[2]), mesh.hanging.masters)
         found = np.flatnonzero(which >= 0)
@@ -139,11 +139,10 @@ def _new_nodes(mesh: BodyMesh, kind: CellType, large: np.ndarray) -> tuple[np.nd
     """
     there = _entities(kind, mesh.cells[large])
     flat = there.reshape(-1, there.shape[2])
-    known = np.zeros((0, there.shape[2]), dtype=np.int64) if mesh.hanging is None else mesh.hanging.masters
+    known = mesh.hanging.masters if mesh.hanging else np.zeros((0, there.shape[2]), dtype=np.int64)
     key = number_faces(np.concatenate([known, flat]))
     node_of = np.full(key.max(initial=-1) + 1, -1)
-    if mesh.hanging is not None:
-        node_of[key[: len(known)]] = mesh.hanging.nodes
+    node_of[key[: len(known)]] = mesh.hanging.nodes
     unique, first = np.unique(key[len(known) :], return_index=True)
     new = node_of[unique] < 0
     node_of[unique[new]] = mesh.n_nodes + np.arange(new.sum())
@@ -154,10 +153,10 @@ def _new_nodes(mesh: BodyMesh, kind: CellType, large: np.ndarray) -> tuple[np.nd
 
 def _still_hanging(
     mesh: BodyMesh, kind: CellType, cells: np.ndarray, between: np.ndarray, levels: np.ndarray
-) -> HangingNodes | None:
-    """Return the nodes in the middle of edges and faces of the refined cells; None without any."""
+) -> HangingNodes:
+    """Return the nodes in the middle of edges and faces of the refined cells."""
     masters, nodes = between, mesh.n_nodes + np.arange(len(between))
-    if mesh.hanging is not None:
+    if mesh.hanging:
         masters = np.concatenate([mesh.hanging.masters, masters])
         nodes = np.concatenate([mesh.hanging.nodes, nodes])
     touched = np.zeros(int(cells.max()) + 1, dtype=bool)
@@ -167,7 +166,7 @@ def _still_hanging(
     which = match_faces(larger, masters)
     hangs[which[which >= 0]] = True
     if not hangs.any():
-        return None
+        return NO_HANGING
     return HangingNodes(nodes[hangs], masters[hangs], levels)
 
 
@@ -191,14 +190,13 @@ def _parts_of_surfaces(
     return result
 
 
-def _mapped(mesh: BodyMesh, chart: Chart, hanging: HangingNodes | None) -> np.ndarray:
+def _mapped(mesh: BodyMesh, chart: Chart, hanging: HangingNodes) -> np.ndarray:
     """Return coordinates: new nodes and those that hang no more are the images of a chart."""
     points = chart.points()
     stays = np.ones(mesh.n_nodes, dtype=bool)
-    if mesh.hanging is not None:
-        stays[mesh.hanging.nodes] = False
+    stays[mesh.hanging.nodes] = False
     points[: mesh.n_nodes][stays] = mesh.points[stays]
-    return points if hanging is None else hanging.placed(points)
+    return hanging.placed(points)
 
 
 def _placed(
@@ -207,7 +205,7 @@ def _placed(
     numbers: tuple[np.ndarray, np.ndarray],
     surfaces: dict[str, np.ndarray],
     shapes: dict[str, SurfaceShape],
-    hanging: HangingNodes | None,
+    hanging: HangingNodes,
 ) -> np.ndarray:
     """Return coordinates: new nodes and those that hang no more lie on the shapes of their surfaces.
 
@@ -219,10 +217,8 @@ def _placed(
     n_old, count = mesh.n_nodes, mesh.n_nodes + len(between) + len(nodes)
     moves = np.zeros(count, dtype=bool)
     moves[n_old:] = True
-    if mesh.hanging is not None:
-        moves[mesh.hanging.nodes] = True
-    if hanging is not None:
-        moves[hanging.nodes] = False
+    moves[mesh.hanging.nodes] = True
+    moves[hanging.nodes] = False
     points = np.concatenate([mesh.points, np.empty((count - n_old, mesh.dim))])
     points[n_old : n_old + len(between)] = points[between].mean(axis=1)
     points[nodes[:, -1]] = points[nodes[:, : 2**mesh.dim]].mean(axis=1)

@@ -22,6 +22,10 @@ class DependentNodes:
     nodes: np.ndarray
     masters: np.ndarray
 
+    def __bool__(self) -> bool:
+        """Return whether there are any."""
+        return len(self.nodes) > 0
+
     @property
     def weights(self) -> np.ndarray:
         """Weights of the masters, which add up to one, shape (n, k)."""
@@ -61,7 +65,7 @@ class HangingNodes(DependentNodes):
         masters: The corners of the larger face that each lies on, none of which hangs, shape (n, 2) in the
             plane, (n, 4) in space; in the middle of an edge its two ends, each twice.
         levels: How often each cell was halved, shape (n_cells,); cells that share a point differ by one at
-            most.
+            most. Empty where there are no hanging nodes.
     """
 
     nodes: np.ndarray
@@ -118,19 +122,22 @@ class Centres(DependentNodes):
         """Weights of the masters, which add up to one, shape (n, k)."""
         return self.given
 
-    def without(self, nodes: np.ndarray) -> Centres | None:
-        """Return those that are not among some nodes; None without any."""
+    def without(self, nodes: np.ndarray) -> Centres:
+        """Return those that are not among some nodes."""
         stays = ~np.isin(self.nodes, nodes)
-        if not stays.any():
-            return None
         return Centres(self.nodes[stays], self.masters[stays], self.given[stays])
 
 
-def nodes_to_hold(hanging: DependentNodes | None, surface: str, facets: np.ndarray) -> np.ndarray:
+_NONE = np.zeros(0, dtype=np.int64)
+#: Of meshes whose cells have one size beside each other.
+NO_HANGING = HangingNodes(_NONE, np.zeros((0, 4), dtype=np.int64), _NONE)
+#: Of meshes all of whose nodes are unknowns.
+NO_CENTRES = Centres(_NONE, np.zeros((0, 20), dtype=np.int64), np.zeros((0, 20)))
+
+
+def nodes_to_hold(hanging: DependentNodes, surface: str, facets: np.ndarray) -> np.ndarray:
     """Return the nodes by which a support holds a surface, ascending: hanging ones follow their masters."""
     nodes = np.unique(facets)
-    if hanging is None:
-        return nodes
     mine = np.isin(hanging.nodes, nodes)
     masters = hanging.masters[mine]
     outside = ~np.isin(masters, nodes).all(axis=1)
@@ -143,14 +150,14 @@ def nodes_to_hold(hanging: DependentNodes | None, surface: str, facets: np.ndarr
     return np.setdiff1d(nodes, hanging.nodes)
 
 
-def require_none(dependent: DependentNodes | None, what: str, remedy: str) -> None:
+def require_none(dependent: DependentNodes, what: str, remedy: str) -> None:
     """Reject the hanging nodes or following centres of a mesh for what cannot deal with them."""
-    if isinstance(dependent, Centres):
+    if isinstance(dependent, Centres) and dependent:
         raise InvalidInputError(
             f"{what} needs complete cells, this mesh has {len(dependent.nodes)} centres that follow other "
             "nodes: make these unknowns by mesh.completed"
         )
-    if dependent is not None:
+    if dependent:
         raise InvalidInputError(
             f"{what} needs a mesh without hanging nodes, this one has {len(dependent.nodes)}: {remedy}"
         )

@@ -10,7 +10,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
 from fenics_contact.mesh.drawn_along import drawn_along
 from fenics_contact.mesh.faces import boundary_faces, match_faces, vector_areas
-from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 from fenics_contact.shapes.combined import Joined
 from fenics_contact.shapes.simple import ROUNDING, STEPS, Plane, SurfaceShape, closest_points, evaluate_shape
 
@@ -21,7 +21,7 @@ def on_shapes(
     surfaces: Mapping[str, np.ndarray],
     shapes: Mapping[str, SurfaceShape],
     new: np.ndarray,
-    hanging: HangingNodes | None = None,
+    hanging: HangingNodes = NO_HANGING,
 ) -> np.ndarray:
     """Return coordinates with new nodes of surfaces on their shapes, all other new ones drawn along.
 
@@ -34,7 +34,7 @@ def on_shapes(
     pieces = cell_type_of(cells, straight.shape[1]).pieces
     linear = cells[:, pieces].reshape(-1, pieces.shape[1])
     found = straight + drawn_along(moved - straight, new & ~placed, straight, linear, along, hanging)
-    return found if hanging is None else hanging.placed(found)
+    return hanging.placed(found)
 
 
 def put_on_shapes(
@@ -43,7 +43,7 @@ def put_on_shapes(
     surfaces: Mapping[str, np.ndarray],
     shapes: Mapping[str, SurfaceShape],
     movable: np.ndarray,
-    hanging: HangingNodes | None = None,
+    hanging: HangingNodes = NO_HANGING,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return coordinates with movable nodes of surfaces on their shapes.
 
@@ -119,9 +119,7 @@ def _part_of(shape: Joined, mesh: BodyMesh, facets: np.ndarray, off: float = 1e-
     """
     points, parts = mesh.points[facets], shape.shapes
     size = np.linalg.norm(np.ptp(points, axis=1), axis=1)[:, None]
-    stays = np.ones(facets.shape, dtype=bool)
-    if mesh.hanging is not None:
-        stays = ~np.isin(facets, mesh.hanging.nodes)
+    stays = ~np.isin(facets, mesh.hanging.nodes)
     flat, middle, areas = points.reshape(-1, mesh.dim), points.mean(axis=1), vector_areas(mesh.points, facets)
     away, badness = np.empty((2, len(facets), len(parts)))
     for number, each in enumerate(parts):

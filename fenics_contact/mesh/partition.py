@@ -124,7 +124,6 @@ def siblings(mesh: BodyMesh) -> np.ndarray:
     with all of them needs no equation for the node.
     """
     hanging = mesh.hanging
-    assert hanging is not None
     faces, pairs = shared_faces(mesh.cells, mesh.dim)
     row_of = np.full(mesh.n_nodes, -1)
     row_of[hanging.nodes] = np.arange(len(hanging.nodes))
@@ -148,7 +147,7 @@ def kept_together(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.n
 
     `partition`: subdomain of each cell, shape (n_cells,).
     """
-    if mesh.hanging is None or np.shape(partition) != (mesh.n_cells,):
+    if not mesh.hanging or np.shape(partition) != (mesh.n_cells,):
         return partition
     group = siblings(mesh)
     counts = csr_matrix((np.ones(mesh.n_cells), (group, partition)))

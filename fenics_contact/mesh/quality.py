@@ -231,7 +231,7 @@ def check_shapes(
     points: np.ndarray,
     surfaces: Mapping[str, np.ndarray],
     shapes: Mapping[str, SurfaceShape],
-    hanging: np.ndarray | None = None,
+    hanging: np.ndarray,
 ) -> dict[str, np.ndarray]:
     """Reject shapes on which a surface does not lie.
 
@@ -253,8 +253,7 @@ def check_shapes(
                 f"{type(shape).__name__} is for {dim}: in the plane give curves, such as a Circle"
             )
         away = distance_in_edges(points, surfaces[name], shape)
-        if hanging is not None:
-            away[np.isin(np.unique(surfaces[name]), hanging)] = 0.0
+        away[np.isin(np.unique(surfaces[name]), hanging)] = 0.0
         off = away > FARTHEST
         if off.any():
             raise InvalidInputError(

@@ -19,7 +19,7 @@ from fenics_contact.mesh.cell_types import CELL_TYPES, CellType, shape_values
 from fenics_contact.mesh.chart import Chart, kept_valid
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.halving import halved
-from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 from fenics_contact.mesh.linear_facets import linear_facets
 from fenics_contact.mesh.on_shapes import on_shapes, with_parts
 from fenics_contact.mesh.quadratic import with_more_nodes
@@ -120,7 +120,7 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
         found, parents, positions = _halved_simplices(mesh, chosen)
         more = _around_inverted(mesh, found, parents)
         if mesh.chart is not None or not more.any():
-            return _checked(mesh, found, None, parents, positions)
+            return _checked(mesh, found, NO_HANGING, parents, positions)
         chosen = np.union1d(chosen, np.flatnonzero(more))
 
 
@@ -151,8 +151,8 @@ def _halved_together(mesh: BodyMesh) -> Refinement:
     if chart is None:
         points = on_shapes(points, cells, surfaces, shapes, np.arange(len(points)) >= mesh.n_nodes)
     named = {name: surfaces[name] for name in mesh.surfaces}
-    fine = _checked(mesh, (points, cells, named, chart), None, parents, positions)
-    if mesh.centres is None:
+    fine = _checked(mesh, (points, cells, named, chart), NO_HANGING, parents, positions)
+    if not mesh.centres:
         return fine
     freed = [name for name, facets in mesh.surfaces.items() if not np.isin(mesh.centres.nodes, facets).any()]
     lean = serendipity(fine.mesh)
@@ -194,7 +194,7 @@ def _around_inverted(mesh: BodyMesh, found: _Found, parents: np.ndarray) -> np.n
 def _checked(
     mesh: BodyMesh,
     found: _Found,
-    hanging: HangingNodes | None,
+    hanging: HangingNodes,
     parents: np.ndarray,
     positions: np.ndarray,
 ) -> Refinement:

@@ -11,7 +11,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
 from fenics_contact.mesh.cell_types import cell_type_of
 from fenics_contact.mesh.collapsed import SHAPES, by_shape
-from fenics_contact.mesh.hanging import Centres
+from fenics_contact.mesh.hanging import NO_CENTRES, Centres
 
 _OF_A_FACE = np.array([-0.25, -0.25, -0.25, -0.25, 0.5, 0.5, 0.5, 0.5])
 """Serendipity functions of the corners and midpoints of a quadrilateral in its centre."""
@@ -19,13 +19,13 @@ _OF_A_CELL = np.concatenate([np.full(8, -0.25), np.full(12, 0.25)])
 """Those of a hexahedron in its centre."""
 
 
-def centres_of(cells: np.ndarray, dim: int) -> Centres | None:
-    """Return the centres of faces and cells, which follow the other nodes; None of cells without centres.
+def centres_of(cells: np.ndarray, dim: int) -> Centres:
+    """Return the centres of faces and cells, which follow the other nodes.
 
     `cells`: node numbers of complete quadratic cells, (n_cells, nodes of a cell).
     """
     if cell_type_of(cells, dim).order == 1:
-        return None
+        return NO_CENTRES
     width = 8 if dim == 2 else 20
     nodes, masters, weights = [np.zeros(0, dtype=np.int64)], [np.zeros((0, width), dtype=np.int64)], []
     for name, (_, own) in by_shape(cells, dim).items():
@@ -39,7 +39,7 @@ def centres_of(cells: np.ndarray, dim: int) -> Centres | None:
             weights.append(np.tile(_OF_A_CELL, (len(own), 1)))
     node, first = np.unique(np.concatenate(nodes), return_index=True)
     if not len(node):
-        return None
+        return NO_CENTRES
     return Centres(node, np.concatenate(masters)[first], np.concatenate(weights)[first])
 
 
@@ -72,7 +72,7 @@ def serendipity(mesh: BodyMesh) -> BodyMesh:
         '2 serendipity hexahedra'
     """
     centres = centres_of(mesh.cells, mesh.dim)
-    if centres is None:
+    if not centres:
         raise InvalidInputError(
             "serendipity needs quadratic cells with faces of four corners, got "
             f"{cell_type_of(mesh.cells, mesh.dim).plural}: make them quadratic first (mesh.quadratic); "
@@ -101,8 +101,6 @@ def completed(mesh: BodyMesh, *surfaces: str) -> BodyMesh:
         >>> completed(box).cells_in_words
         '2 quadratic hexahedra'
     """
-    if mesh.centres is None:
-        return mesh
     facets = [mesh.surfaces[name].ravel() for name in surfaces]
     freed = np.concatenate(facets) if surfaces else mesh.centres.nodes
     if not np.isin(mesh.centres.nodes, freed).any():

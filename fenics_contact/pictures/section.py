@@ -145,7 +145,7 @@ def nodal(body: pv.UnstructuredGrid, name: str) -> np.ndarray:
     """Return a field on cells as the mean over the cells around each node, (n_nodes,)."""
     values = np.array(body.cell_data_to_point_data()[name])
     hanging = hanging_of(body)  # continuous across faces between small and large cells
-    return values if hanging is None else hanging.placed(values)
+    return hanging.placed(values)
 
 
 def lengths(body: pv.UnstructuredGrid) -> np.ndarray:
@@ -509,7 +509,7 @@ def section_layers(bodies: Bodies, section: Section, look: Mapping[str, Any]) ->
     for name, face in cut(bodies, section).items():
         if face.n_points:
             layers.append(Layer(face, {"lighting": False, **look}))
-            hangs = hanging_of(bodies[name]) is not None
+            hangs = bool(hanging_of(bodies[name]))
             whole = face.clean(tolerance=1e-5) if hangs else face
             edge = whole.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)
             if hangs:

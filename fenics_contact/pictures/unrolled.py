@@ -239,7 +239,7 @@ def _patch(state: State, pair: int, reach: float | None, unrolling: Unrolling | 
     every, given = contact.points.of_surface(pair, contact.pressure)
     shown = np.isin(every, numbers)
     pressure[nodes[np.searchsorted(numbers, every[shown])]] = given[shown]
-    if mesh.hanging is not None:
+    if mesh.hanging:
         of_points = every - state.torn.decomposition.tearing.first_of(slave.body)
         pressure = mesh.hanging.filled_in(pressure, mesh.surfaces[slave.name], of_points)
     if not state.scene.contacts[pair].by_mortar:

@@ -190,10 +190,9 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
     pressure[place] = inside[point]
     spread[place] = _modulus(state, pair) * np.maximum(apart[point], 0.0)
     whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
-    hanging, fill = scene.bodies[slave.body].mesh.hanging, None
-    if hanging is not None:
-        fill = hanging.filled(surface.nodes, np.isin(np.arange(len(nodes)), place))
-        pressure, spread = fill @ pressure, fill @ spread
+    known = np.isin(np.arange(len(nodes)), place)
+    fill = scene.bodies[slave.body].mesh.hanging.filled(surface.nodes, known)
+    pressure, spread = fill @ pressure, fill @ spread
     by_mortar = scene.contacts[pair].by_mortar
     if not by_mortar:
         pressure, spread = (filled_at_corners(whole, each) for each in (pressure, spread))
@@ -211,11 +210,10 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
     facing[place] = 1.0
     if by_mortar:
         areas = nodal_areas(surface.points, surface.facets, scene.axisymmetric).ravel()
-        of_nodes = np.bincount(surface.facets.ravel(), areas)
-        of_nodes = of_nodes if fill is None else fill.T @ of_nodes
+        of_nodes = fill.T @ np.bincount(surface.facets.ravel(), areas)
         whole_area = np.bincount(point, of_nodes[place], points.count)
         facing[place] = contact.nominal_area[point] / whole_area[point]
-    facing = facing if fill is None else fill @ facing
+    facing = fill @ facing
     if not by_mortar:
         facing = np.maximum(filled_at_corners(whole, facing), 0.0)
     if scene.axisymmetric and not by_mortar:

@@ -320,7 +320,7 @@ def contact_fields(
             field[nodes[own]] = values[own]
             mesh = scene.bodies[body].mesh
             facets = mesh.surfaces[scene.contacts[pair].slave.name]
-            if filled and mesh.hanging is not None:
+            if filled and mesh.hanging:
                 field = mesh.hanging.filled_in(field, facets, nodes[own])
             filled_in = filled and not scene.contacts[pair].by_mortar
             field = filled_at_corners(facets, field) if filled_in else field

@@ -11,7 +11,7 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.mesh.collapsed import SHAPES, by_shape
-from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 from fenics_contact.results.fields import GatheredFields, in_space
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def body_grid(mesh: BodyMesh, points: np.ndarray, *, by_shapes: bool = False) ->
         return _grid_of_shapes(mesh, points)
     kind = _VTK_SHAPES[CELL_TYPES[mesh.cell_type].shape_name][mesh.order - 1][0]
     grid = pv.UnstructuredGrid({pv.CellType(kind): mesh.cells}, points)
-    if mesh.hanging is not None:
+    if mesh.hanging:
         grid.field_data["hanging_nodes"] = mesh.hanging.nodes
         grid.field_data["hanging_masters"] = mesh.hanging.masters
     return grid
@@ -96,10 +96,10 @@ def _grid_of_shapes(mesh: BodyMesh, points: np.ndarray) -> pyvista.UnstructuredG
     return _pyvista().UnstructuredGrid(flat, types, points)
 
 
-def hanging_of(grid: pyvista.DataSet) -> HangingNodes | None:
-    """Return the hanging nodes of a body on a grid from `body_grid`, levels left out; None without any."""
+def hanging_of(grid: pyvista.DataSet) -> HangingNodes:
+    """Return the hanging nodes of a body on a grid from `body_grid`, levels left out."""
     if "hanging_nodes" not in grid.field_data:
-        return None
+        return NO_HANGING
     nodes, masters = (np.asarray(grid.field_data[f"hanging_{key}"]) for key in ("nodes", "masters"))
     return HangingNodes(nodes, masters, np.zeros(grid.n_cells, dtype=np.int64))
 

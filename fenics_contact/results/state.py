@@ -435,7 +435,7 @@ class State(ABC):
         subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
         on_cells = stress_fields(self.gather_stress(body))
         on_nodes = stress_fields(most_stressed(self.gather_nodal_stress(body)), "nodal_")
-        if (hanging := self.scene.bodies[body].mesh.hanging) is not None:
+        if hanging := self.scene.bodies[body].mesh.hanging:
             on_nodes = {name: hanging.placed(values) for name, values in on_nodes.items()}
         return GatheredFields(
             {"displacement": self.gather_displacement(body), **self._contact_fields(body), **on_nodes},

@@ -111,7 +111,7 @@ def test_crossings_are_known_where_one_side_has_smaller_cells(soft: bool) -> Non
     scene = Scene({"b": body}, [Support("b", "high")])
     finer = refine_scene(scene, {"b": body.mesh.regions["soft" if soft else "hard"]}).scene
     found = Crossings.of(finer.bodies["b"], scene.supports)
-    assert finer.bodies["b"].mesh.hanging is not None
+    assert finer.bodies["b"].mesh.hanging
     assert finer.bodies["b"].mesh.points[found.nodes] == pytest.approx(np.array([[-1.0, 0.0]]))
 
 

@@ -64,7 +64,7 @@ def test_centres_of_quadratic_cells_have_the_temperatures_around_them(tmp_path: 
     found = read_deck(deck(tmp_path, text))
     (heat,) = (load for load in found.steps[0].loads if isinstance(load, ThermalStrain))
     body = found.scene.bodies["BAR"].mesh
-    assert body.centres is not None
+    assert body.centres
     assert isinstance(heat.value, NodeValues)
     np.testing.assert_allclose(heat.value.values, 100.0 * body.points[:, 0], atol=1e-10)
 

@@ -36,7 +36,7 @@ def displacement(scene: Scene, name: str) -> np.ndarray:
     A.assemble()
     b = dolfinx.fem.petsc.assemble_vector(vector_form)
     fixed, value = _prescribed(scene, name, body, nodes, dofs)
-    if body.mesh.hanging is None:
+    if not body.mesh.hanging:
         x = _solve(A, b, fixed, value)
     else:
         x = _solve_following(A, b, fixed, value, _followed(body, nodes, dofs))

@@ -22,7 +22,7 @@ from tests.linear.several_ranks import displacement_of
 @pytest.mark.parametrize("cut", ["whole", "bisected", "striped"])
 def test_an_even_stress_is_even_across_cells_of_different_sizes(dim: int, cut: str) -> None:
     mesh = graded(dim)
-    assert mesh.hanging is not None
+    assert mesh.hanging
     partition = {
         "whole": np.zeros(mesh.n_cells, dtype=int),
         "bisected": bisection_partition(mesh, 6),

@@ -96,7 +96,7 @@ def test_an_even_pressure_passes_between_surfaces_whose_centres_are_unknowns(pai
     )
     for name, surface in (("lower", "z1"), ("upper", "z0")):
         mesh = scene.bodies[name].mesh
-        assert mesh.centres is not None
+        assert mesh.centres
         assert not np.isin(mesh.centres.nodes, mesh.surfaces[surface]).any()
         assert np.isin(mesh.centres.nodes, mesh.surfaces["x0"]).any()
     state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-11)
@@ -125,7 +125,7 @@ def test_cells_without_centres_are_refused_and_complete_ones_stay() -> None:
         serendipity(ten)
     assert completed(ten) is ten
     box = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (1, 1, 1))))
-    assert completed(box).centres is None
+    assert not completed(box).centres
     with pytest.raises(InvalidInputError, match=r"must lie where these say, node \d+ does not by 0\.1"):
         BodyMesh(box.points + 0.1 * np.eye(27)[26][:, None], box.cells, centres=box.centres)
 
@@ -185,7 +185,7 @@ def test_quadratic_cells_are_halved_all_together(dim: int, lean: bool) -> None:
     fine = refined(coarse, np.arange(coarse.n_cells))
     mesh = fine.mesh
     assert mesh.n_cells == 2**dim * coarse.n_cells
-    assert (mesh.centres is not None) == lean
+    assert bool(mesh.centres) == lean
     np.testing.assert_array_equal(fine.parents, np.repeat(np.arange(coarse.n_cells), 2**dim))
     np.testing.assert_array_equal(mesh.points[: coarse.n_nodes], coarse.points)
     assert mesh.volume == pytest.approx(coarse.volume, rel=1e-3 if lean else 1e-12)

@@ -32,7 +32,7 @@ def everywhere(mesh: BodyMesh) -> BodyMesh:
 def outside(mesh: BodyMesh) -> np.ndarray:
     """Return the places (a, b) in the section of all nodes on the boundary that do not hang, shape (n, 2)."""
     nodes = np.unique(boundary_faces(mesh.cells, 3, mesh.hanging)[0])
-    if mesh.hanging is not None:
+    if mesh.hanging:
         nodes = np.setdiff1d(nodes, mesh.hanging.nodes)
     x, y, z = mesh.points[nodes].T
     # The centre line: a straight piece between two half circles.
@@ -71,7 +71,7 @@ def test_new_nodes_lie_on_the_arcs_around_the_section(cell: str) -> None:
         assert len(places) > 100
         assert off_the_section(places).max() < 1e-12
         for name, shape in mesh.shapes.items():
-            nodes = np.setdiff1d(mesh.surfaces[name], [] if mesh.hanging is None else mesh.hanging.nodes)
+            nodes = np.setdiff1d(mesh.surfaces[name], mesh.hanging.nodes)
             assert np.abs(shape.distance(mesh.points[nodes])).max() < 1e-12
 
 
@@ -89,11 +89,11 @@ def test_layers_inside_are_halved_as_they_were_graded() -> None:
 def test_nodes_move_onto_the_body_once_they_hang_no_more() -> None:
     mesh = link()
     half = refined(mesh, np.arange(0, mesh.n_cells, 3)).mesh
-    assert half.hanging is not None
+    assert half.hanging
     middle = half.points[half.hanging.masters].mean(axis=1)
     np.testing.assert_allclose(half.points[half.hanging.nodes], middle, atol=1e-13)
     rest = refined(half, np.flatnonzero(half.hanging.levels == 0)).mesh
-    assert rest.hanging is None
+    assert not rest.hanging
     assert off_the_section(outside(rest)).max() < 1e-12
     assert rest.volume == pytest.approx(everywhere(mesh).volume, rel=1e-13)
 
@@ -160,7 +160,7 @@ def test_cells_of_coarse_and_strongly_graded_links_stay_valid(cell: str, reaches
     assert mesh.chart is not None
     assert scaled_jacobian(mesh.points, mesh.cells).min() > 1e-3
     free = np.ones(mesh.n_nodes, dtype=bool)
-    if mesh.hanging is not None:
+    if mesh.hanging:
         free[mesh.hanging.nodes] = False
     off = np.flatnonzero(free & (np.abs(mesh.chart.points() - mesh.points).max(axis=1) > 1e-9))
     assert len(off) > 0, "nothing had to be kept valid"

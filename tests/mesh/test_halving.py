@@ -76,7 +76,7 @@ def test_cells_are_halved_in_every_direction(fine: BodyMesh) -> None:
 
 def test_faces_between_small_and_large_cells_lie_inside(fine: BodyMesh) -> None:
     coarse = straight(fine.dim)
-    assert fine.hanging is not None
+    assert fine.hanging
     assert len(np.unique(fine.hanging.levels)) == 4
     assert fine.volume == pytest.approx(coarse.volume, rel=1e-13)
     outside, _ = boundary_faces(fine.cells, fine.dim, fine.hanging)
@@ -90,7 +90,7 @@ def test_faces_between_small_and_large_cells_lie_inside(fine: BodyMesh) -> None:
 def test_hanging_nodes_are_those_inside_edges_and_faces_of_cells(fine: BodyMesh) -> None:
     """Found from coordinates: the middle of an edge or a face of some cell is a node."""
     hanging, kind = fine.hanging, CELL_TYPES[fine.cell_type]
-    assert hanging is not None
+    assert hanging
     ends = np.array([[v, far] for v, around in enumerate(kind.edges) for far in around])
     middles = [fine.points[fine.cells[:, part]].mean(axis=2) for part in (ends, kind.faces)]
     away, node = cKDTree(fine.points).query(np.concatenate([m.reshape(-1, fine.dim) for m in middles]))
@@ -103,7 +103,7 @@ def test_hanging_nodes_are_those_inside_edges_and_faces_of_cells(fine: BodyMesh)
 
 def test_cells_that_share_a_point_differ_by_one_level(fine: BodyMesh) -> None:
     hanging = fine.hanging
-    assert hanging is not None
+    assert hanging
     size = 0.4 * 0.5**hanging.levels
     for cell in range(0, fine.n_cells, 3):
         low, high = fine.points[fine.cells[cell]].min(axis=0), fine.points[fine.cells[cell]].max(axis=0)
@@ -116,9 +116,9 @@ def test_cells_that_share_a_point_differ_by_one_level(fine: BodyMesh) -> None:
 def test_what_is_refined_everywhere_hangs_nowhere() -> None:
     mesh = straight(3)
     once = refined(mesh, near(mesh, 0.6)).mesh
-    assert once.hanging is not None
+    assert once.hanging
     rest = refined(once, np.flatnonzero(once.hanging.levels == 0)).mesh
-    assert rest.hanging is None
+    assert not rest.hanging
     assert (rest.n_cells, rest.n_nodes) == (8 * mesh.n_cells, 11 * 7 * 7)
 
 
@@ -133,7 +133,7 @@ def test_fields_are_carried_by_positions_in_parents(fine: BodyMesh) -> None:
 def test_new_nodes_lie_on_true_shapes_and_hanging_ones_on_facets() -> None:
     mesh = domed()
     once = refined(mesh, mesh.points[mesh.cells].mean(axis=1)[:, 0] > 1.0).mesh
-    assert once.hanging is not None
+    assert once.hanging
     whole = refined(once, np.flatnonzero(once.hanging.levels == 0)).mesh
 
     def off(mesh: BodyMesh) -> np.ndarray:
@@ -190,7 +190,7 @@ def test_the_surface_in_contact_is_the_shape_also_at_hanging_nodes() -> None:
 
 def test_hanging_nodes_follow_when_a_mesh_is_moved(fine: BodyMesh) -> None:
     hanging = fine.hanging
-    assert hanging is not None
+    assert hanging
     bent = fine.points + 0.05 * np.sin(3.0 * fine.points[:, ::-1])
     for moved in (fine.moved(bent), fine.reshaped(bent), replace(fine, surfaces={}).moved(bent)):
         middle = moved.points[hanging.masters].mean(axis=1)
@@ -204,7 +204,7 @@ def test_hanging_nodes_follow_when_a_mesh_is_moved(fine: BodyMesh) -> None:
 def test_siblings_at_hanging_nodes_lie_in_one_subdomain(fine: BodyMesh, parts: int) -> None:
     """Where a subdomain has a hanging node, it has all its masters."""
     hanging = fine.hanging
-    assert hanging is not None
+    assert hanging
     stripes = (fine.points[fine.cells].mean(axis=1) @ np.arange(1, fine.dim + 1) * 3).astype(int)
     stripes = np.unique(stripes, return_inverse=True)[1]
     for partition in (bisection_partition(fine, parts), kept_together(fine, stripes)):
@@ -220,7 +220,7 @@ def test_siblings_at_hanging_nodes_lie_in_one_subdomain(fine: BodyMesh, parts: i
 
 def test_large_and_small_cells_are_neighbours(fine: BodyMesh) -> None:
     pairs = neighbours(fine.cells, fine.dim, fine.hanging)
-    assert fine.hanging is not None
+    assert fine.hanging
     across = pairs[np.ptp(fine.hanging.levels[pairs], axis=1) == 1]
     assert len(across) > 2 ** (fine.dim - 1)
     areas = vector_areas(fine.points, boundary_faces(fine.cells, fine.dim, fine.hanging)[0])
@@ -238,7 +238,7 @@ def test_only_outer_faces_face_another_body() -> None:
 
 def broken(mesh: BodyMesh, change: Callable[[dict[str, np.ndarray]], None]) -> BodyMesh:
     hanging = mesh.hanging
-    assert hanging is not None
+    assert hanging
     values = {name: getattr(hanging, name).copy() for name in ("nodes", "masters", "levels")}
     change(values)
     return replace(mesh, hanging=type(hanging)(**values))
@@ -272,7 +272,7 @@ def test_what_cannot_deal_with_hanging_nodes_refuses_them(fine: BodyMesh) -> Non
 
 def test_a_surface_with_a_support_needs_whole_facets_of_large_cells() -> None:
     fine = graded(straight(3), 1)
-    assert fine.hanging is not None
+    assert fine.hanging
     facets = fine.surfaces["x1"]
     nodes = fine.nodes_to_hold("x1")
     assert len(nodes) < len(np.unique(facets))
