@@ -285,18 +285,25 @@ def _scaled_start(problem: DualProblem, start: DualSolution | Vector | None) -> 
 
 
 def _unscaled(problem: DualProblem, solution: DualSolution) -> DualSolution:
-    """Return the solution for λ of one for μ, with its residuals. Collective."""
+    """Return the solution for λ of one for μ, with its residuals. Collective.
+
+    Jumps that are last digits for μ, whose rows are equally stiff, are so for λ: where soft and stiff parts
+    are held side by side, jumps of the soft ones would be compared with motions of the stiff ones.
+    """
     assert problem.scaling is not None
     s = problem.scaling.factor
     multiplier, product = s * solution.multiplier, solution.product / s
     answer = answer_at(problem, multiplier, product, solution.alpha)
+    residuals = answer.residuals
+    if solution.residuals.gluing == 0.0:
+        residuals = replace(residuals, gluing=0.0)
     return replace(
         solution,
         multiplier=multiplier,
         product=product,
         residual=answer.residual,
         slip_bound=problem.law.bound(multiplier),
-        residuals=answer.residuals,
+        residuals=residuals,
     )
 
 

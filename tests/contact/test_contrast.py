@@ -10,7 +10,23 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import ContactPair, RigidPlane, Scene, State, Status, Surface, box_partition, solve_scene
+from fenics_contact import (
+    Body,
+    BodyMesh,
+    ContactPair,
+    ContactProblem,
+    RigidPlane,
+    Scene,
+    State,
+    Status,
+    Support,
+    Surface,
+    Traction,
+    box_partition,
+    solve_scene,
+)
+from fenics_contact.gallery import rectangle_lattice
+from fenics_contact.materials import PlaneStrain
 from tests.contact.checks import assert_solved
 from tests.contact.contrast import FRICTION, Blocks, Regions
 
@@ -101,3 +117,22 @@ def test_a_stiff_body_acts_on_a_soft_one_as_a_rigid_one() -> None:
     assert errors[0] > 0.2
     assert errors[2] < 0.002
     assert errors[1] / errors[2] == pytest.approx(10.0, rel=0.2)
+
+
+@pytest.mark.parametrize("contrast", [1e2, 3629.4, 1e4, 1e6])
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral"])
+def test_soft_and_stiff_parts_held_side_by_side_have_an_answer(cell: str, contrast: float) -> None:
+    """All rows are those of supports, where nothing moves: jumps are last digits of the soft part."""
+    mesh = rectangle_lattice(([0.0, 1.0687, 2.4541], [0.0, 0.6813, 1.9366]), cell)
+    top, middle = mesh.surfaces["y1"], mesh.points[mesh.cells].mean(axis=1)
+    stiff = (middle[:, 0] < 1.0687) & (middle[:, 1] > 0.6813)
+    over = {"over": top[mesh.points[top].mean(axis=1)[:, 0] < 1.0687]}
+    regions = {"soft": np.flatnonzero(~stiff), "stiff": np.flatnonzero(stiff)}
+    mesh = BodyMesh(mesh.points, mesh.cells, mesh.surfaces | over, regions=regions)
+    materials = {"soft": PlaneStrain(2e4, 0.13), "stiff": PlaneStrain(contrast * 2e4, 0.13)}
+    pushed = Traction("a", "over", lambda x: (1.0 + 0.56 * x[:, :1]) * np.array([5.17, -19.9]))
+    scene = Scene({"a": Body(mesh, materials)}, [Support("a", "x0", (0.0, 0.0))], [pushed])
+    state = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-8).solve(adjoint=True)
+    assert_solved(state, 1e-8)
+    force = 1.0687 * (1.0 + 0.28 * 1.0687) * np.array([5.17, -19.9])
+    np.testing.assert_allclose(state.reactions()["a x0"].force, -force, rtol=1e-10)
