@@ -127,6 +127,17 @@ class IsotropicMaterial(_Material):
             )
         return ISOTROPIC[self.model](**given)
 
+    @classmethod
+    def describes(cls, made: object) -> bool:
+        """Return whether it is one of the three."""
+        return type(made) in ISOTROPIC.values()
+
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of one of the three."""
+        model = next(name for name, kind in ISOTROPIC.items() if kind is type(made))
+        return cls.keys({**vars(made), "model": model})
+
 
 class _WithAxes(_Material):
     axis_1: Triple = Field((1.0, 0.0, 0.0), description="direction of material axis 1, any length")
@@ -137,6 +148,12 @@ class _WithAxes(_Material):
     def build(self, folder: Path) -> Material:
         """Return the material."""
         return self.made(orientation=orthotropic_module.material_axes(self.axis_1, self.axis_2))
+
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of the material, with two of its axes."""
+        first, second, _ = made.orientation
+        return cls.keys({**vars(made), "axis_1": first, "axis_2": second})
 
 
 @keys_of(orthotropic_module.OrthotropicElasticity, without=["orientation"])

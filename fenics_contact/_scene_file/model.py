@@ -189,6 +189,11 @@ class NoFriction(Part):
     def made(self, **other: Any) -> None:
         """Return None."""
 
+    @classmethod
+    def describes(cls, made: object) -> bool:
+        """Return whether there is no law."""
+        return made is None
+
 
 FRICTION_LAWS = (
     NoFriction,
@@ -241,8 +246,16 @@ class FluidPart(Part):
     enters: str = Field(description="surface of the slave's body with which the slave shares an edge")
 
 
+class _PairPart(Part):
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of a pair, without a discretisation that the scene has chosen."""
+        chosen = {"discretisation"} if made.reason else set()
+        return {key: value for key, value in super().written(made).items() if key not in chosen}
+
+
 @keys_of(ContactPair, without={"choice"})
-class ContactPart(Part):
+class ContactPart(_PairPart):
     """Two surfaces that may touch, or a surface and a rigid obstacle."""
 
     slave: SurfaceOfBody
@@ -269,7 +282,7 @@ class AutomaticPart(Part):
 
 
 @keys_of(Tie, without={"choice"})
-class TiePart(Part):
+class TiePart(_PairPart):
     """Two surfaces that stay together."""
 
     slave: SurfaceOfBody
@@ -277,7 +290,7 @@ class TiePart(Part):
 
 
 @keys_of(CyclicSymmetry, without={"choice"})
-class CyclicPart(Part):
+class CyclicPart(_PairPart):
     """Both sides of a sector that repeats around an axis."""
 
     kind: Literal["cyclic"]
@@ -298,8 +311,23 @@ class _Named(Part):
 
     @property
     def size(self) -> Any:
-        """A part that load steps change."""
+        """What load steps change."""
         return getattr(self, self.changed)
+
+    @classmethod
+    def size_of(cls, made: Any) -> Any:
+        """Return what load steps change of an object."""
+        return getattr(made, cls.changed)
+
+    @classmethod
+    def changed_key(cls) -> str:
+        """Return the key of what load steps change."""
+        return cls.model_fields[cls.changed].alias or cls.changed
+
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of an object, always with what load steps change."""
+        return {**super().written(made), cls.changed_key(): cls.size_of(made)}
 
 
 class _Load(_Named):
@@ -320,6 +348,11 @@ class TotalMomentLoad(_Load):
     moment: either(list, Vector, float) = Field(  # type: ignore[valid-type]
         alias="value", description="three numbers, in the plane one, positive from x to y, [force·length]"
     )
+
+    @classmethod
+    def describes(cls, made: object) -> bool:
+        """Return no: a total force has these keys, too."""
+        return False
 
     def build(self, dim: int, value: Any = None) -> Load:
         """Return the load, without a force."""
@@ -342,6 +375,22 @@ class CentrifugalLoad(_Load):
     changed: ClassVar[str] = "speed"
     kind: Literal["centrifugal"]
     speed: Scalar
+
+    @classmethod
+    def describes(cls, made: object) -> bool:
+        """Return whether a force per volume is that of a rotation."""
+        return isinstance(made, loads.BodyForce) and isinstance(made.value, loads.Spinning)
+
+    @classmethod
+    def size_of(cls, made: Any) -> Any:
+        """Return the speed."""
+        return made.value.speed
+
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of the force, whose value knows the axis."""
+        spin = made.value
+        return cls.keys({**vars(spin), "body": made.body, "region": made.region})
 
     def build(self, dim: int, value: Any = None) -> Load:
         """Return the load, at the speed of a load step if given."""
@@ -408,6 +457,11 @@ class RigidPart(_Named):
         count = len(self.at)  # type: ignore[attr-defined]
         return self.value or (None,) * (3 * count - 3)
 
+    @classmethod
+    def size_of(cls, made: Any) -> Any:
+        """Return the motion."""
+        return made.motion
+
     def build(self, dim: int, value: tuple[Any, ...] | None = None) -> RigidSurface:
         """Return the rigid surface, with the motion of a load step if given."""
         motion = tuple(map(self._number, value or self.size))
@@ -438,6 +492,20 @@ class RollerPart(_Named):
         description="displacement along the direction, along the normal positive outwards, [length]: a "
         "number, a formula in x, y, z in quotes, or a field from a file; zero by default",
     )
+
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of the roller.
+
+        Raises:
+            InvalidInputError: If its directions differ from node to node.
+        """
+        if callable(made.direction):
+            raise InvalidInputError(
+                f"a scene file has no directions that differ from node to node, as {made.in_words} has: run "
+                "the deck, or read it in Python"
+            )
+        return super().written(made)
 
     def build(self, dim: int, value: Any = None) -> Roller:
         """Return the roller, with the displacement of a load step if given."""
@@ -508,6 +576,12 @@ class ConstraintPart(Part):
         """Build the constraint."""
         return super().made(terms=[term.made() for term in self.terms], name=self.name or "")
 
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of the constraint."""
+        own = {name: getattr(made, name) for name in cls.given}
+        return cls.keys({**own, "name": made.label, "terms": made.terms})
+
 
 @keys_of(Preload, without=("section", "name"))
 class PreloadPart(Part):
@@ -534,6 +608,13 @@ class PreloadPart(Part):
         if plane:
             section = Section(self.point or (), self.normal or (), self.region, self.radius)
         return super().made(section=section, name=self.name or "")
+
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of the preload, with the keys of its section."""
+        cut = made.section
+        section = vars(cut) if isinstance(cut, Section) else {"regions": cut}
+        return cls.keys({**{name: getattr(made, name) for name in cls.given}, **section, "name": made.label})
 
 
 class PreloadAim(Part):
@@ -581,9 +662,9 @@ class ToolPart(_Named):
         )  # fmt: skip
 
 
+SUPPORTS = (RigidPart, RollerPart, ToolPart)
 AnySupportPart: TypeAlias = Annotated[
-    Any,
-    one_of("kind", RigidPart, RollerPart, ToolPart, other=SupportPart, when=lambda part: "kind" not in part),
+    Any, one_of("kind", *SUPPORTS, other=SupportPart, when=lambda part: "kind" not in part)
 ]
 LOADS = (
     table_of(loads.Traction, _Load, kind="traction"),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Collection, Sequence
-from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_type_hints
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, create_model, model_validator
 from pydantic.fields import FieldInfo
@@ -86,6 +86,27 @@ class Part(BaseModel):
         own = {name: getattr(self, name) for name in self.given}
         parts = {name: value.made() for name, value in own.items() if isinstance(value, Part)}
         return type(self).of(**{**own, **parts, **other})
+
+    @classmethod
+    def describes(cls, made: object) -> bool:
+        """Return whether the table builds such an object."""
+        return type(made) is cls.of
+
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of an object, the inverse of `made`; objects within it stay as they are."""
+        return cls.keys({name: getattr(made, name, None) for name in cls.given})
+
+    @classmethod
+    def keys(cls, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return values under their keys but defaults and None, and the key that names the table."""
+        found = {}
+        for name, field in cls.model_fields.items():
+            names = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
+            value = values.get(name, names[0] if len(names) == 1 and field.is_required() else None)
+            if value is not None and not (type(value) is type(field.default) and value == field.default):
+                found[field.alias or name] = value
+        return found
 
     @model_validator(mode="wrap")
     @classmethod

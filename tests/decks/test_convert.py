@@ -115,6 +115,13 @@ def test_the_command_line_writes_a_scene_file(tmp_path: Path, capsys: pytest.Cap
     assert cli.main(MPI.COMM_SELF, ["run", str(tmp_path / "model.toml"), "--plan"]) == 0
 
 
+def test_a_deck_without_steps_is_the_scene_before_them(tmp_path: Path) -> None:
+    files = write_scene_file(read_deck(deck(tmp_path, BAR + FIXED)), tmp_path / "scene.toml")
+    scene = read_scene_file(files[0], MPI.COMM_SELF).scene
+    assert [(each.surface, each.value) for each in scene.supports] == [("BAR_X0", (0.0, 0.0, 0.0))]
+    assert not scene.loads
+
+
 def test_what_a_scene_file_cannot_say_is_refused(tmp_path: Path) -> None:
     ring = "*TRANSFORM, NSET=BAR_X1, TYPE=C\n0., 0., 0., 0., 0., 1.\n*BOUNDARY\nBAR_X0, 1, 3\n"
     turned = step("*CLOAD\n502, 1, 7.\n") + step("*CLOAD\n502, 1, 9.\n")
