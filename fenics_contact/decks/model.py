@@ -239,7 +239,7 @@ class Model:
             self.note(
                 card,
                 f"the Jacobian of {len(bad)} elements of body {part.name} is not positive at a corner or "
-                f"an edge, down to {least.min():.3g} in element {card.told(number)}; it is {inside:.3g} and "
+                f"an edge, down to {least.min():.3g} in element {card.label(number)}; it is {inside:.3g} and "
                 "more at their Gauss points, which count: bend them less where results matter",
             )
 

@@ -121,14 +121,14 @@ def tables_of(deck: Printing, state: State, step: int) -> list[PrintTable]:
         Collective on the communicator of the state.
     """
     return [
-        _told(table, deck.instances)
+        _own_numbers(table, deck.instances)
         for each in deck.prints
         if each.step == step and each.card in ("NODE PRINT", "EL PRINT")
         for table in _tables(deck, each, state)
     ]
 
 
-def _told(table: PrintTable, instances: Instances | None) -> PrintTable:
+def _own_numbers(table: PrintTable, instances: Instances | None) -> PrintTable:
     """Return a table with the numbers that nodes and elements have in their instances."""
     if instances is None:
         return table

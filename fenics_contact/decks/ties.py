@@ -41,7 +41,7 @@ class Reach:
         `least`: share of the tolerance from which on a gap counts.
         """
         if len(self.apart):
-            number = mesh.blocks[0].card.told(mesh.numbers[self.apart[0]])
+            number = mesh.blocks[0].card.label(mesh.numbers[self.apart[0]])
             yield (
                 f"{len(self.apart)} nodes of {slave}, such as {number}, are farther from {master} than the "
                 f"position tolerance {self.tolerance:.3g}: they stay apart, and {int((~self.tied).sum())} of "

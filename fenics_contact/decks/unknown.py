@@ -41,7 +41,7 @@ def refuse_unknown(cards: Sequence[Card]) -> None:
         return
     (card, words), *others = found
     if others:
-        listed = [f"*{each.written} (line {each.line} of {each.file}): {told}" for each, told in others]
+        listed = [f"*{each.written} (line {each.line} of {each.file}): {what}" for each, what in others]
         words += "; not known either are\n  " + "\n  ".join(listed)
     raise card.error(words)
 

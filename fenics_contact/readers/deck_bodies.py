@@ -53,7 +53,7 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
     if len(lost):
         block = mesh.blocks[mesh.block_of[lost[0]]]
         raise block.card.error(
-            f"element {block.card.told(mesh.element_numbers[lost[0]])} and {len(lost) - 1} others have no "
+            f"element {block.card.label(mesh.element_numbers[lost[0]])} and {len(lost) - 1} others have no "
             "*SOLID SECTION: give every element one, which names its material"
         )
     return sections, of_element
@@ -142,7 +142,7 @@ class Exterior:
         """Refuse faces that are no exterior ones, with the line of a card."""
         outer = self.holds(faces)
         if not outer.all():
-            number = card.told(self.mesh.element_numbers[faces.elements[~outer][0]])
+            number = card.label(self.mesh.element_numbers[faces.elements[~outer][0]])
             raise card.error(
                 f"{what} on the boundary of a body, a face of element {number} lies between two elements: "
                 f"{remedy}", row,
@@ -292,7 +292,7 @@ def _check_block(block: Block, points: np.ndarray) -> None:
         least = jacobians(places, cells[bad], AT_GAUSS_POINTS).min(axis=1)
         worst = int(np.argmin(least))
         at = ", ".join(f"{x:.6g}" for x in places[cells[bad[worst]]].mean(axis=0))
-        first = map(block.card.told, block.numbers[bad[:5]].tolist())
+        first = map(block.card.label, block.numbers[bad[:5]].tolist())
         numbers = ", ".join(first) + (", ..." if len(bad) > 5 else "")
         ends = np.cumsum([line.strip().rstrip(",").count(",") + 1 for line in block.card.lines])
         width = 1 + len(block.element.written)
@@ -300,7 +300,7 @@ def _check_block(block: Block, points: np.ndarray) -> None:
         raise block.card.error(
             f"every element must have a positive Jacobian at its Gauss points, {len(bad)} of {len(cells)} "
             f"of type {block.element.name} are inverted or flat: {numbers}; the smallest is "
-            f"{least[worst]:.3g} in element {block.card.told(block.numbers[bad[worst]])} around ({at}): see "
+            f"{least[worst]:.3g} in element {block.card.label(block.numbers[bad[worst]])} around ({at}): see "
             "the order of their nodes, and their coordinates", row,
         )  # fmt: skip
 

@@ -110,7 +110,7 @@ class Card:
         """Name of the instance of a part that it belongs to, "" for none."""
         return ""
 
-    def told(self, number: int) -> str:
+    def label(self, number: int) -> str:
         """Return how a node or element is called in the deck: "5", or "BOLT-1.5" of an instance."""
         if self.instances is None or number < self.instances.stride:
             return str(number)

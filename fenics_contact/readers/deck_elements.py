@@ -207,7 +207,7 @@ def without_repeated(
             )
             raise card.error(
                 f"{len(mine)} elements of type {element.name} list nodes twice otherwise than "
-                f"linear ones may, first element {card.told(numbers[mine[0]])}: {remedy}"
+                f"linear ones may, first element {card.label(numbers[mine[0]])}: {remedy}"
             )
         shape, places, onto = found
         cell = {"prism": "wedge"}.get(shape.name, shape.name)

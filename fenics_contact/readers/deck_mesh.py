@@ -132,7 +132,7 @@ class DeckMesh:
         lost = np.flatnonzero(known[found] != numbers) if len(known) else np.arange(len(numbers))
         if len(lost):
             line = int(lost[0]) if by_row else row
-            lacking = f"{what} {card.told(numbers[lost[0]])}"
+            lacking = f"{what} {card.label(numbers[lost[0]])}"
             raise card.error(f"{lacking} is not there: correct the number, or add it", line)
         return np.asarray(found)
 
@@ -168,7 +168,7 @@ class DeckMesh:
                     row,
                 )
             if not element.faces[side]:
-                first = card.told(self.element_numbers[elements[block_of[elements] == number][0]])
+                first = card.label(self.element_numbers[elements[block_of[elements] == number][0]])
                 raise card.error(
                     f"face {label!r} of element {first}, which lists nodes twice, is no more than an edge: "
                     "leave it out",
@@ -270,7 +270,7 @@ def _elements(mesh: DeckMesh, cards: Sequence[Card]) -> None:
     if len(again):
         number = np.sort(mesh.element_numbers)[again[0]]
         card = [block.card for block in mesh.blocks if number in block.numbers][-1]
-        which = f"element {card.told(number)}"
+        which = f"element {card.label(number)}"
         raise card.error(f"{which} is there already: give each element a number of its own")
 
 
