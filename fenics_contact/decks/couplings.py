@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.supports import RigidSurface
-from fenics_contact.decks.history import History, Moment
+from fenics_contact.decks.steps import DeckSteps, Instant
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import DeckMesh, Faces
 
@@ -118,14 +118,14 @@ def _rigid_body(card: Card, mesh: DeckMesh) -> Driven:
 
 
 def rigid_surface(
-    driven: Driven, body: str, surface: str, at: np.ndarray, moment: Moment | None
+    driven: Driven, body: str, surface: str, at: np.ndarray, instant: Instant | None
 ) -> RigidSurface:
     """Return the rigid surface of a node at a time, at zero before all."""
     dim = len(at)
     turns = [3, 4, 5] if dim == 3 else [5]
     held, force = np.full(6, np.nan), np.zeros(6)
-    if moment is not None:
-        held, force = driven.row(moment.held), driven.row(moment.forces)
+    if instant is not None:
+        held, force = driven.row(instant.held), driven.row(instant.forces)
     motion = [None if np.isnan(value) else float(value) for value in held]
     free = np.isnan(held)
     load = np.where(free, force, 0.0)
@@ -183,12 +183,12 @@ def _sense(card: Card, mesh: DeckMesh, faces: Faces) -> float:
     return -1.0 if np.array([*card.floats(0), 0.0, 0.0, 0.0])[:3] @ outward < 0.0 else 1.0
 
 
-def drawn(bolt: Bolt, held: Preload, moment: Moment, before: Moment | None) -> Preload | None:
+def drawn(bolt: Bolt, held: Preload, instant: Instant, before: Instant | None) -> Preload | None:
     """Return how a bolt is drawn in a step, None where it is held at its length."""
-    shortening, force = moment.held[bolt.node, 0], moment.forces[bolt.node, 0]
+    shortening, force = instant.held[bolt.node, 0], instant.forces[bolt.node, 0]
     if not np.isnan(shortening):
         same = before is not None and before.held[bolt.node, 0] == shortening
-        if same or moment.fixed[bolt.node, 0]:
+        if same or instant.fixed[bolt.node, 0]:
             return None
         drawn = bolt.sense * float(shortening)
         return Preload(held.body, held.section, shortening=drawn, name=held.name)
@@ -260,7 +260,7 @@ class LocalAxes:
     card: Card
 
 
-def read_axes(cards: Sequence[Card], mesh: DeckMesh, history: History) -> dict[int, np.ndarray]:
+def read_axes(cards: Sequence[Card], mesh: DeckMesh, steps: DeckSteps) -> dict[int, np.ndarray]:
     """Return the local axes of nodes by their positions, as rows."""
     found: dict[int, np.ndarray] = {}
     for card in cards:
@@ -282,7 +282,7 @@ def read_axes(cards: Sequence[Card], mesh: DeckMesh, history: History) -> dict[i
             size = np.linalg.norm(out, axis=1)
             # On the axis no direction is the radial one: any serves where both across it are held alike.
             on_axis = size <= 1e-9 * np.abs(arms).max()
-            _check_on_axis(nodes[on_axis], card, mesh, history)
+            _check_on_axis(nodes[on_axis], card, mesh, steps)
             out[on_axis] = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
             out /= np.linalg.norm(out, axis=1)[:, None]
             axes = np.stack([out, np.cross(along, out), np.tile(along, (len(nodes), 1))], axis=1)
@@ -290,11 +290,11 @@ def read_axes(cards: Sequence[Card], mesh: DeckMesh, history: History) -> dict[i
     return found
 
 
-def _check_on_axis(nodes: np.ndarray, card: Card, mesh: DeckMesh, history: History) -> None:
+def _check_on_axis(nodes: np.ndarray, card: Card, mesh: DeckMesh, steps: DeckSteps) -> None:
     """Reject nodes on the axis of a cylinder that are held or loaded along one direction across it."""
-    for step in history.steps:
-        for moment in step.moments:
-            held, force = moment.held[nodes, :2], moment.forces[nodes, :2]
+    for step in steps.steps:
+        for instant in step.instants:
+            held, force = instant.held[nodes, :2], instant.forces[nodes, :2]
             wrong = np.isnan(held[:, 0]) != np.isnan(held[:, 1])
             wrong |= np.nan_to_num(held).any(axis=1) | force.any(axis=1)
             if wrong.any():

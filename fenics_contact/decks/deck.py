@@ -20,7 +20,6 @@ from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import AnySupport, Roller
-from fenics_contact.decks.acting import Acting
 from fenics_contact.decks.contact import (
     Sides,
     adjusted,
@@ -30,10 +29,11 @@ from fenics_contact.decks.contact import (
     read_sides,
 )
 from fenics_contact.decks.couplings import drawn
-from fenics_contact.decks.history import Moment
-from fenics_contact.decks.holding import Holding
+from fenics_contact.decks.loads import LoadBuilder
 from fenics_contact.decks.model import Model
 from fenics_contact.decks.pair_changes import read_changes
+from fenics_contact.decks.steps import Instant
+from fenics_contact.decks.supports import SupportBuilder
 from fenics_contact.decks.tables import Print, PrintTable, tables_of
 from fenics_contact.decks.ties import reach_of
 from fenics_contact.decks.unknown import refuse_unknown
@@ -215,8 +215,8 @@ class _Builder:
 
     def __init__(self, name: str, cards: Sequence[Card]) -> None:
         self.model = Model(name, cards)
-        self.holding = Holding(self.model)
-        self.acting = Acting(self.model, self.holding)
+        self.supports = SupportBuilder(self.model)
+        self.loads = LoadBuilder(self.model, self.supports)
 
     def deck(self) -> Deck:
         """Return the deck."""
@@ -226,19 +226,19 @@ class _Builder:
                 model.note(card, f"has no effect here ({WITHOUT_EFFECT[card.name]})")
             if card.name == "NSET" and "FREQUENCY" in card.parameters:
                 model.note(card, "FREQUENCY is of output, it has no effect on a set")
-        supported = self.holding.supported()
+        supported = self.supports.supported()
         sides = self._contact_surfaces()
-        self.holding.name_surfaces()
-        self.holding.name_nodes()
-        self.acting.name_surfaces()
+        self.supports.name_surfaces()
+        self.supports.name_nodes()
+        self.loads.name_surfaces()
         self._named_surfaces()
         self._named_nodes()
-        loaded = self.acting.loaded()
+        loaded = self.loads.loaded()
         model.build_meshes()
         bodies = model.bodies()
-        preloads = self.holding.preloads()
-        supports = self.holding.supports(supported, None)
-        rollers, constraints = self.holding.equations()
+        preloads = self.supports.preloads()
+        supports = self.supports.supports(supported, None)
+        rollers, constraints = self.supports.equations()
         supports = (*supports, *rollers)
         scene = self._scene(bodies, supports, *self._pairs(sides), preloads, constraints)
         steps, step_of = self._steps(scene, bodies, supported, loaded, preloads, rollers)
@@ -272,27 +272,27 @@ class _Builder:
         """Return the load steps, and the step of the deck of each."""
         steps: list[LoadStep] = []
         step_of = []
-        before: Moment | None = None
-        for number, step in enumerate(self.model.history.steps):
+        before: Instant | None = None
+        for number, step in enumerate(self.model.steps.steps):
             self.model.origins["step", step.name] = step.card.origin
-            for moment in step.moments:
-                part = "" if moment is step.moments[-1] else f", time {moment.time:g}"
-                loads = self.acting.loads(moment, loaded[id(moment)], bodies)
-                supports = (*self.holding.supports(supported, moment), *rollers)
+            for instant in step.instants:
+                part = "" if instant is step.instants[-1] else f", time {instant.time:g}"
+                loads = self.loads.loads(instant, loaded[id(instant)], bodies)
+                supports = (*self.supports.supports(supported, instant), *rollers)
                 acting = None
                 if self.model.bolts:
                     pairs = zip(self.model.bolts, preloads, strict=True)
-                    aims = [drawn(bolt, held, moment, before) for bolt, held in pairs]
+                    aims = [drawn(bolt, held, instant, before) for bolt, held in pairs]
                     acting = [aim for aim in aims if aim is not None]
                 contacts = self._contacts_of(number, scene)
-                values = self.holding.equation_values(moment) if self.model.equations else None
+                values = self.supports.equation_values(instant) if self.model.equations else None
                 name = f"{step.name}{part}"
                 steps.append(
                     LoadStep(
-                        name, loads, supports, moment.time, acting, contacts=contacts, constraints=values
+                        name, loads, supports, instant.time, acting, contacts=contacts, constraints=values
                     )
                 )
-                before = moment
+                before = instant
                 step_of.append(number)
         return tuple(steps), tuple(step_of)
 
@@ -435,7 +435,7 @@ class _Builder:
 
     def _prints(self) -> tuple[Print, ...]:
         found = []
-        for step, card in self.model.history.prints:
+        for step, card in self.model.steps.prints:
             where = card.name_of("NSET") or card.name_of("ELSET") or card.name_of("SURFACE")
             variables = tuple(entry.upper() for row in card.rows for entry in row if entry)
             found.append(Print(step, card.written, where, variables, card.name_of("TOTALS"), card.origin))

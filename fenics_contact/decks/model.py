@@ -18,11 +18,11 @@ from fenics_contact.decks.couplings import (
     read_equations,
     require_own_nodes,
 )
-from fenics_contact.decks.history import History, read_history
 from fenics_contact.decks.initial_stress import read_initial
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
 from fenics_contact.decks.multi_point import mean_equations, read_means, read_points, shared_out
 from fenics_contact.decks.regions import split_sections
+from fenics_contact.decks.steps import DeckSteps, read_steps
 from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.quality import AT_GAUSS_POINTS, jacobians, thickness
@@ -57,7 +57,7 @@ class Model:
         self.parts_of_mesh = components(self.mesh, self.sections, self.of_element)
         self.exterior = Exterior.of(self.mesh)
         self.thickness = self._thickness()
-        self.history: History = read_history(cards, self.mesh)
+        self.steps: DeckSteps = read_steps(cards, self.mesh)
         self.parts: Parts
         self.surfaces: dict[str, Faces] = {}
         self.node_sets: dict[str, np.ndarray] = {}
@@ -69,14 +69,14 @@ class Model:
         self.means = read_means(cards, self.mesh)
         require_own_nodes([(each.card, each.node) for each in self.bolts], self.mesh)
         require_own_nodes([(each.card, each.node) for each in self.means], self.mesh)
-        large = any(step.large for step in self.history.steps)
-        held = [~np.isnan(moment.held) for moment in self.history.moments]
+        large = any(step.large for step in self.steps.steps)
+        held = [~np.isnan(instant.held) for instant in self.steps.instants]
         self.equations = [
             *read_equations(cards, self.mesh),
             *read_points(cards, self.mesh, large),
             *(mean_equations(self.means, np.any(held, axis=0)) if held else ()),
         ]
-        self.local_axes = read_axes(cards, self.mesh, self.history)
+        self.local_axes = read_axes(cards, self.mesh, self.steps)
         nodes = [[each.node, each.turning] for each in self.driven] + [[bolt.node] for bolt in self.bolts]
         nodes += [[each.node] for each in self.means]
         self.references = np.array(
@@ -86,8 +86,8 @@ class Model:
 
     def _split(self) -> None:
         """Cut sections where a part of them is loaded."""
-        weights = [w for moment in self.history.moments for w in moment.weights]
-        loaded = {w.where: self.mesh.elements_named(w.where, w.card, w.row) for w in weights}
+        weights = [w for instant in self.steps.instants for w in instant.weights]
+        loaded = {w.where[0]: self.mesh.elements_named(w.where[0], w.card, w.row) for w in weights}
         self.mesh, self.sections, self.of_element, self.parts_of_mesh = split_sections(
             self.mesh, self.sections, self.of_element, self.parts_of_mesh, loaded.items()
         )
@@ -101,10 +101,10 @@ class Model:
     def _share_forces(self) -> None:
         """Take forces per unit of thickness and along x, y and z, those of means on their nodes."""
         steps = [
-            replace(step, moments=[replace(m, forces=self._shared(m.forces)) for m in step.moments])
-            for step in self.history.steps
+            replace(step, instants=[replace(m, forces=self._shared(m.forces)) for m in step.instants])
+            for step in self.steps.steps
         ]
-        self.history = replace(self.history, steps=steps)
+        self.steps = replace(self.steps, steps=steps)
 
     def _shared(self, forces: np.ndarray) -> np.ndarray:
         return shared_out(in_global_axes(forces, self.local_axes), self.means) / self.thickness
@@ -167,9 +167,9 @@ class Model:
 
     def bodies(self) -> dict[str, Body]:
         """Return the bodies with their materials."""
-        large = any(step.large for step in self.history.steps)
-        if large and not all(step.large for step in self.history.steps):
-            step = next(step for step in self.history.steps if not step.large)
+        large = any(step.large for step in self.steps.steps)
+        if large and not all(step.large for step in self.steps.steps):
+            step = next(step for step in self.steps.steps if not step.large)
             raise step.card.error("all steps must have NLGEOM, or none, got both: give it to this one, too")
         bodies, temperature, heated = {}, self._temperature(), self._heated()
         for part in self.parts_of_mesh:
@@ -246,22 +246,20 @@ class Model:
     def _heated(self) -> bool:
         """Return whether the temperature of any node changes."""
         return any(
-            moment.temperatures is not None and bool((moment.temperatures != self.history.initial).any())
-            for moment in self.history.moments
+            bool((instant.temperatures != self.steps.initial).any()) for instant in self.steps.instants
         )
 
     def _initial_of(self, part: Component) -> float | None:
         """Return the initial temperature of a body if it is the same everywhere."""
         nodes = self.parts.nodes[part.name]
-        found = np.unique(self.history.initial[nodes[nodes >= 0]])
+        found = np.unique(self.steps.initial[nodes[nodes >= 0]])
         return float(found[0]) if len(found) == 1 else None
 
     def _temperature(self) -> float | None:
         """Return the temperature if it is the same everywhere and always."""
-        found = {float(t) for t in np.unique(self.history.initial)}
-        for moment in self.history.moments:
-            if moment.temperatures is not None:
-                found |= {float(t) for t in np.unique(moment.temperatures)}
+        found = {float(t) for t in np.unique(self.steps.initial)}
+        for instant in self.steps.instants:
+            found |= {float(t) for t in np.unique(instant.temperatures)}
         return found.pop() if len(found) == 1 else None
 
     def nodes_of_bodies(self) -> np.ndarray:

@@ -46,7 +46,7 @@ UNSEEN_MUTATIONS = (
     ),
     Mutation(
         "centres of cells keep the temperature that no deck gives them",
-        "decks/acting.py",
+        "decks/loads.py",
         "(mesh.centres.given * change[mesh.centres.masters]).sum(axis=1)",
         "change[mesh.centres.nodes]",
         (

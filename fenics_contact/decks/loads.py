@@ -24,11 +24,11 @@ from fenics_contact._scene.loads import (
 from fenics_contact.decks.couplings import (
     Driven,
 )
-from fenics_contact.decks.history import Moment, Pressed, Weight
-from fenics_contact.decks.holding import Holding
 from fenics_contact.decks.initial_stress import relieved
 from fenics_contact.decks.model import Model
 from fenics_contact.decks.regions import region_names
+from fenics_contact.decks.steps import Acting, Instant
+from fenics_contact.decks.supports import SupportBuilder
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.readers.deck_bodies import (
     Component,
@@ -37,11 +37,11 @@ from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import Faces
 
 
-class Acting:
+class LoadBuilder:
     """Makes loads of what acts at a time of a deck."""
 
-    def __init__(self, model: Model, holding: Holding) -> None:
-        self.model, self.holding = model, holding
+    def __init__(self, model: Model, supports: SupportBuilder) -> None:
+        self.model, self.supports = model, supports
         #: Where pressures act -> the name of the surface.
         self.pressed: dict[tuple[str, ...], str] = {}
 
@@ -69,29 +69,29 @@ class Acting:
             self.model.origins["load", name] = first.card.origin
             self.pressed.update((each.where, name) for each in several)
 
-    def _alike(self) -> list[list[Pressed]]:
-        """Return the pressures of all moments; those on single elements together that are always equal."""
-        moments = self.model.history.moments
-        first: dict[tuple[str, ...], Pressed] = {}
+    def _alike(self) -> list[list[Acting]]:
+        """Return the pressures of all instants; those on single elements together that are always equal."""
+        instants = self.model.steps.instants
+        first: dict[tuple[str, ...], Acting] = {}
         values: dict[tuple[str, ...], list[float]] = {}
-        for number, moment in enumerate(moments):
-            for pressed in moment.pressures:
+        for number, instant in enumerate(instants):
+            for pressed in instant.pressures:
                 first.setdefault(pressed.where, pressed)
-                values.setdefault(pressed.where, [0.0] * len(moments))[number] = pressed.value
-        found: dict[tuple[object, ...], list[Pressed]] = {}
+                values.setdefault(pressed.where, [0.0] * len(instants))[number] = pressed.value
+        found: dict[tuple[object, ...], list[Acting]] = {}
         for where, pressed in first.items():
             single = len(where) == 2 and where[0].isdecimal()
             found.setdefault(tuple(values[where]) if single else where, []).append(pressed)
         return list(found.values())
 
-    def _single_faces(self, several: Sequence[Pressed]) -> Faces:
+    def _single_faces(self, several: Sequence[Acting]) -> Faces:
         """Return the faces of single elements."""
         mesh, card = self.model.mesh, several[0].card
         numbers = np.array([int(each.where[0]) for each in several])
         sides = np.array([int(each.where[1][1:]) - 1 for each in several])
         return Faces(mesh.positions(numbers, "element", card), sides)
 
-    def _faces(self, pressed: Pressed) -> Faces:
+    def _faces(self, pressed: Acting) -> Faces:
         card, row = pressed.card, pressed.row
         if len(pressed.where) == 1:
             given = self.model.mesh.surface_named(pressed.where[0], card, row)
@@ -104,13 +104,14 @@ class Acting:
         return self.model.mesh.faces_of(elements, pressed.where[1], card, row)
 
     def loaded(self) -> dict[int, list[tuple[str, np.ndarray | None]]]:
-        """Name the nodes that forces act on; return for each moment its names, with None for many forces."""
+        """Name the nodes that forces act on; return for each instant its names, with None for many forces."""
         result: dict[int, list[tuple[str, np.ndarray | None]]] = {}
         inside = self.model.nodes_of_bodies()
-        for step in self.model.history.steps:
-            for moment in step.moments:
+        for step in self.model.steps.steps:
+            for instant in step.instants:
                 turned = np.flatnonzero(
-                    moment.forces[:, 3:].any(axis=1) & ~np.isin(np.arange(len(inside)), self.model.references)
+                    instant.forces[:, 3:].any(axis=1)
+                    & ~np.isin(np.arange(len(inside)), self.model.references)
                 )
                 if len(turned):
                     raise step.card.error(
@@ -118,11 +119,11 @@ class Acting:
                         f"{self.model.mesh.numbers[turned[0]]} has one: load a surface by a node, with "
                         "*COUPLING"
                     )
-                self._check_plane(step.card, moment.forces)
+                self._check_plane(step.card, instant.forces)
                 loose = inside & ~np.isin(np.arange(len(inside)), self.model.references)
-                force = np.where(loose[:, None], moment.forces, 0.0)[:, : self.model.dim]
+                force = np.where(loose[:, None], instant.forces, 0.0)[:, : self.model.dim]
                 nodes = np.flatnonzero(force.any(axis=1))
-                result[id(moment)] = self._groups(nodes, force) if len(nodes) else []
+                result[id(instant)] = self._groups(nodes, force) if len(nodes) else []
         return result
 
     def _check_plane(self, card: Card, forces: np.ndarray) -> None:
@@ -150,7 +151,7 @@ class Acting:
         return [(self.model.set_of(nodes[number.ravel() == k]), value) for k, value in enumerate(values)]
 
     def loads(
-        self, moment: Moment, loaded: Sequence[tuple[str, np.ndarray | None]], bodies: Mapping[str, Body]
+        self, instant: Instant, loaded: Sequence[tuple[str, np.ndarray | None]], bodies: Mapping[str, Body]
     ) -> tuple[Load, ...]:
         """Return the loads at a time."""
         found: list[Load] = []
@@ -159,25 +160,24 @@ class Acting:
                 mine, inner = self.model.in_body(body, self.model.node_sets[name])
                 if len(mine):
                     owned = self.model.owned(body, mine)
-                    each = moment.forces[mine, : self.model.dim] * owned[:, None]
+                    each = instant.forces[mine, : self.model.dim] * owned[:, None]
                     value: Any = (
                         tuple(force.tolist())
                         if force is not None and owned.all()
                         else NodeValues(mesh.points[inner], each)
                     )
                     found.append(PointForce(body, name, value))
-        pressures = {self.pressed[pressed.where]: pressed.value for pressed in moment.pressures}
+        pressures = {self.pressed[pressed.where]: pressed.value for pressed in instant.pressures}
         for name, value in pressures.items():
             if value:
                 meshes = self.model.parts.meshes.items()
                 found += [Pressure(body, name, value) for body, mesh in meshes if name in mesh.surfaces]
-        for weight in moment.weights:
+        for weight in instant.weights:
             found += self._weights(weight)
-        for driven, name in self.holding.driven:
+        for driven, name in self.supports.driven:
             if driven.spread:
-                found += self._spread(driven, name, moment)
-        if moment.temperatures is not None:
-            found += self._heat(moment.temperatures, bodies)
+                found += self._spread(driven, name, instant)
+        found += self._heat(instant.temperatures, bodies)
         return (*found, *self._stressed(bodies))
 
     def _stressed(self, bodies: Mapping[str, Body]) -> list[Load]:
@@ -206,15 +206,15 @@ class Acting:
             found.append(InitialStress(part.name, value))
         return found
 
-    def _spread(self, driven: Driven, name: str, moment: Moment) -> list[Load]:
-        """Return the force and moment of a node, spread over its surface."""
-        body, *others = self.holding.bodies_of(name)
+    def _spread(self, driven: Driven, name: str, instant: Instant) -> list[Load]:
+        """Return the force and instant of a node, spread over its surface."""
+        body, *others = self.supports.bodies_of(name)
         if others:
             raise driven.card.error(
                 f"a distributing coupling loads a surface of one body, {driven.name!r} is on {body} and "
                 f"{', '.join(others)}: give one for each, with a node of its own"
             )
-        held, load = driven.row(moment.held), driven.row(moment.forces)
+        held, load = driven.row(instant.held), driven.row(instant.forces)
         if not np.isnan(held).all():
             raise driven.card.error(
                 "a distributing coupling takes forces, but its node is held: use *KINEMATIC for displacements"
@@ -233,9 +233,9 @@ class Acting:
             )
         ]
 
-    def _weights(self, weight: Weight) -> list[Load]:
+    def _weights(self, weight: Acting) -> list[Load]:
         """Return gravity or centrifugal force on bodies, by region where some are not loaded or differ."""
-        elements = self.model.mesh.elements_named(weight.where, weight.card, weight.row)
+        elements = self.model.mesh.elements_named(weight.where[0], weight.card, weight.row)
         found: list[Load] = []
         for part in self.model.parts_of_mesh:
             if not weight.value:
@@ -251,31 +251,33 @@ class Acting:
             found += [self._weight(weight, part, density, region) for region, density in densities.items()]
         return found
 
-    def _density(self, weight: Weight, section: int) -> float:
+    def _density(self, weight: Acting, section: int) -> float:
         name = self.model.sections[section].material
         density = self.model.materials[name].density
         if not density:
-            raise weight.card.error(f"{weight.kind} needs a *DENSITY of material {name}: add it", weight.row)
+            raise weight.card.error(
+                f"{weight.where[1]} needs a *DENSITY of material {name}: add it", weight.row
+            )
         return density
 
-    def _check_direction(self, weight: Weight, numbers: np.ndarray) -> None:
+    def _check_direction(self, weight: Acting, numbers: np.ndarray) -> None:
         """Reject directions that plane bodies and bodies of revolution do not have."""
         if self.model.dim == 3:
             return
-        revolved, spins = self.model.kind == "axisymmetric", weight.kind == "CENTRIF"
+        revolved, spins = self.model.kind == "axisymmetric", weight.where[1] == "CENTRIF"
         point, along = (numbers[:3], numbers[3:]) if spins else (np.zeros(3), numbers)
         across = along[[0, 2]] if revolved else along[:2] if spins else along[2:]
         if across.any() or (revolved and spins and point[0]):
             needed = "the axis of revolution, y" if revolved else "z" if spins else "the plane"
             raise weight.card.error(
-                f"{weight.kind} of these elements must be along {needed}, got {numbers.tolist()}: correct it",
+                f"{weight.where[1]} here must be along {needed}, got {numbers.tolist()}: correct it",
                 weight.row,
             )
 
-    def _weight(self, weight: Weight, part: Component, density: float, region: str | None) -> BodyForce:
+    def _weight(self, weight: Acting, part: Component, density: float, region: str | None) -> BodyForce:
         numbers = np.array(weight.numbers)
         self._check_direction(weight, numbers)
-        if weight.kind == "GRAV":
+        if weight.where[1] == "GRAV":
             along = weight.value * numbers / np.linalg.norm(numbers)
             return gravity(part.name, density, along[: self.model.dim].tolist(), region)
         speed = float(np.sqrt(weight.value))
@@ -290,8 +292,7 @@ class Acting:
         found: list[Load] = []
         for name, mesh in self.model.parts.meshes.items():
             nodes = self.model.parts.nodes[name]
-            change = (temperatures - self.model.history.initial)[nodes]
-            change = mesh.centres.placed(change)
+            change = mesh.centres.placed((temperatures - self.model.steps.initial)[nodes])
             materials = bodies[name].materials
             if not change.any() or not all(getattr(m, "expands", False) for m in materials):
                 continue

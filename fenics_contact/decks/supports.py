@@ -21,16 +21,16 @@ from fenics_contact.decks.couplings import (
     by_node,
     rigid_surface,
 )
-from fenics_contact.decks.history import Held, Moment
 from fenics_contact.decks.model import Model
 from fenics_contact.decks.rigid_links import by_small_turns, following, in_their_space, spread_out
+from fenics_contact.decks.steps import Held, Instant
 from fenics_contact.readers.deck_bodies import (
     Component,
 )
 from fenics_contact.readers.deck_mesh import Faces, joined
 
 
-class Holding:
+class SupportBuilder:
     """Makes supports, springs and bolts of what a deck holds."""
 
     def __init__(self, model: Model) -> None:
@@ -43,7 +43,7 @@ class Holding:
         inside = self.model.nodes_of_bodies()
         found: dict[str, tuple[np.ndarray, set[int]]] = {}
         single = np.zeros((len(inside), 3), dtype=bool)
-        for target in self.model.history.targets:
+        for target in self.model.steps.targets:
             nodes = target.nodes[inside[target.nodes]]
             inner = [k for k in target.components if k < self.model.dim]
             self._check_turns(target, nodes)
@@ -72,8 +72,8 @@ class Holding:
     def _marks(self) -> list[np.ndarray]:
         """Return what is held in the steps, (n_nodes, 3), each time that it changes."""
         found: list[np.ndarray] = []
-        for step in self.model.history.steps:
-            now = ~np.isnan(step.moments[-1].held[:, :3])
+        for step in self.model.steps.steps:
+            now = ~np.isnan(step.instants[-1].held[:, :3])
             if not found or (now != found[-1]).any():
                 found.append(now)
         return found
@@ -82,8 +82,8 @@ class Holding:
         """Reject nodes that drive rigid surfaces and are fixed where their motion was free before."""
         driving = {node for driven in self.model.driven for node in (driven.node, driven.turning)}
         here = [node for node in target.nodes.tolist() if node in driving]
-        moments = self.model.history.moments
-        if any(moment.kept[node, list(target.components)].any() for moment in moments for node in here):
+        instants = self.model.steps.instants
+        if any(instant.kept[node, list(target.components)].any() for instant in instants for node in here):
             raise target.card.error(
                 f"node {self.model.mesh.numbers[here[0]]}, which drives a surface, was free before it is "
                 "FIXED: give the displacement at which it is to be held", target.row,
@@ -93,8 +93,8 @@ class Holding:
         """Reject rotations of nodes of elements, which have none, unless they are held at zero."""
         turned = [k for k in target.components if k > 2]
         free = nodes[~np.isin(nodes, self.model.references)]
-        moments = self.model.history.moments
-        if turned and any(np.nan_to_num(moment.held[free][:, turned]).any() for moment in moments):
+        instants = self.model.steps.instants
+        if turned and any(np.nan_to_num(instant.held[free][:, turned]).any() for instant in instants):
             name = target.label or self.model.mesh.numbers[free[0]]
             raise target.card.error(
                 f"nodes of solid elements have no rotation, but {name} is turned: drive the "
@@ -109,8 +109,8 @@ class Holding:
             return
         across = np.array([abs(self.model.local_axes[int(node)][inner, 2]) for node in turned])
         wrong = (abs(across - np.equal(inner, 2)) > 1e-9).any(axis=1)
-        for moment in self.model.history.moments:
-            wrong &= (moment.held[turned, :3] != 0.0).any(axis=1)
+        for instant in self.model.steps.instants:
+            wrong &= (instant.held[turned, :3] != 0.0).any(axis=1)
         if wrong.any():
             node = int(turned[wrong][0])
             k = inner[int(abs(across[wrong][0] - np.equal(inner, 2)).argmax())]
@@ -122,13 +122,13 @@ class Holding:
             )  # fmt: skip
 
     def supports(
-        self, supported: Mapping[str, tuple[np.ndarray, tuple[int, ...]]], moment: Moment | None
+        self, supported: Mapping[str, tuple[np.ndarray, tuple[int, ...]]], instant: Instant | None
     ) -> tuple[AnySupport, ...]:
         """Return the supports at a time; before all those of the first step, at zero."""
         found = []
-        marks = None if moment is None else ~np.isnan(moment.held)
-        if marks is None and self.model.history.steps:
-            marks = ~np.isnan(self.model.history.steps[0].moments[0].held)
+        marks = None if instant is None else ~np.isnan(instant.held)
+        if marks is None and self.model.steps.steps:
+            marks = ~np.isnan(self.model.steps.steps[0].instants[0].held)
         for name, (nodes, components) in supported.items():
             held = [k for k in components if marks is None or marks[nodes, k].all()]
             if not held:
@@ -137,10 +137,10 @@ class Holding:
                 mine, inner = self.model.in_body(body, nodes)
                 if not len(mine):
                     continue
-                found += self._supports_of(body, name, mine, mesh.points[inner], held, moment)
+                found += self._supports_of(body, name, mine, mesh.points[inner], held, instant)
         for driven, name in self.driven:
             if not driven.spread:
-                found += self._rigid(driven, name, moment)
+                found += self._rigid(driven, name, instant)
         return tuple(found)
 
     def _supports_of(
@@ -150,16 +150,16 @@ class Holding:
         nodes: np.ndarray,
         points: np.ndarray,
         held: Sequence[int],
-        moment: Moment | None,
+        instant: Instant | None,
     ) -> list[AnySupport]:
         """Return the supports of some nodes of a body: along x, y and z, or along their local axes."""
-        given = [np.zeros(len(nodes)) if moment is None else moment.held[nodes, k] for k in held]
+        given = [np.zeros(len(nodes)) if instant is None else instant.held[nodes, k] for k in held]
         amounts: list[Any] = [
             float(each[0]) if np.ptp(each) == 0.0 else NodeValues(points, each) for each in given
         ]
         for place, k in enumerate(held):
-            if moment is not None and moment.kept[nodes, k].any():
-                amounts[place] = self._kept(name, moment.kept[nodes, k])
+            if instant is not None and instant.kept[nodes, k].any():
+                amounts[place] = self._kept(name, instant.kept[nodes, k])
         turned = [self.model.local_axes[node] for node in nodes.tolist() if node in self.model.local_axes]
         whole = len(held) == self.model.dim and not any(each.any() for each in given)
         if not turned or (whole and self._always_zero(nodes, held)):
@@ -180,7 +180,7 @@ class Holding:
     def _kept(self, name: str, kept: np.ndarray) -> Kept:
         """Return a support that keeps what all of its nodes have."""
         if not kept.all():
-            target = next(each for each in self.model.history.targets if "FIXED" in each.card.parameters)
+            target = next(each for each in self.model.steps.targets if "FIXED" in each.card.parameters)
             raise target.card.error(
                 f"nodes of {name!r} that are FIXED were partly free before: give those that were in a set of "
                 "their own", target.row,
@@ -189,11 +189,11 @@ class Holding:
 
     def _always_zero(self, nodes: np.ndarray, held: Sequence[int]) -> bool:
         """Return whether components of nodes are held at zero in all steps."""
-        moments = self.model.history.moments
+        instants = self.model.steps.instants
         held = list(held)
         return not any(
-            np.nan_to_num(moment.held[nodes][:, held]).any() or moment.kept[nodes][:, held].any()
-            for moment in moments
+            np.nan_to_num(instant.held[nodes][:, held]).any() or instant.kept[nodes][:, held].any()
+            for instant in instants
         )
 
     def name_surfaces(self) -> None:
@@ -259,20 +259,20 @@ class Holding:
         meshes = self.model.parts.meshes.items()
         return [body for body, mesh in meshes if name in mesh.surfaces or name in mesh.node_sets]
 
-    def _rigid(self, driven: Driven, name: str, moment: Moment | None) -> list[RigidSurface]:
+    def _rigid(self, driven: Driven, name: str, instant: Instant | None) -> list[RigidSurface]:
         """Return the rigid surfaces of a node: that of the first body, or of all where all is given."""
         self.model.origins["support", name] = driven.card.origin
-        if moment is None and self.model.history.steps:
-            first = self.model.history.steps[0].moments[0]
-            moment = replace(first, held=0.0 * first.held, forces=0.0 * first.forces)
+        if instant is None and self.model.steps.steps:
+            first = self.model.steps.steps[0].instants[0]
+            instant = replace(first, held=0.0 * first.held, forces=0.0 * first.forces)
         at = self.model.mesh.points[driven.node, : self.model.dim]
         bodies = self._rigid_bodies(driven, name)
-        return [rigid_surface(driven, body, name, at, moment) for body in bodies]
+        return [rigid_surface(driven, body, name, at, instant) for body in bodies]
 
     def _rigid_bodies(self, driven: Driven, name: str) -> list[str]:
         """Return the bodies with a rigid surface of their own; others follow that of the first one."""
         bodies = self.bodies_of(name)
-        held = [driven.row(moment.held)[self.model.motions] for moment in self.model.history.moments]
+        held = [driven.row(instant.held)[self.model.motions] for instant in self.model.steps.instants]
         if len(bodies) == 1 or (held and not np.isnan(held).any()):
             return bodies
         sizes = [len(spread_out(self.model.parts.meshes[b].points[self._nodes(b, name)])) for b in bodies]
@@ -303,11 +303,11 @@ class Holding:
 
     def _moved(self, driven: Driven, name: str, points: np.ndarray, leaders: np.ndarray) -> np.ndarray:
         """Return how points move with others of one rigid piece, (n, components, m, dim)."""
-        dim, moments = self.model.dim, self.model.history.moments
+        dim, instants = self.model.dim, self.model.steps.instants
         turned = [k for k in self.model.motions if k > 2]
-        turns = any((driven.row(moment.held)[turned] != 0.0).any() for moment in moments)
+        turns = any((driven.row(instant.held)[turned] != 0.0).any() for instant in instants)
         weights = in_their_space(points, leaders) if turns else np.ones((len(points), 1))
-        if weights is None and not any(step.large for step in self.model.history.steps):
+        if weights is None and not any(step.large for step in self.model.steps.steps):
             moved = by_small_turns(points, leaders)
             if moved is not None:
                 return moved
@@ -334,7 +334,7 @@ class Holding:
             if not inside[at].any():
                 raise each.card.error("needs a node of an element, this equation has none: add one", each.row)
             for node, component in zip(at[~inside[at]], np.array(each.components)[~inside[at]], strict=True):
-                if any(np.isnan(moment.held[node, component]) for moment in self.model.history.moments):
+                if any(np.isnan(instant.held[node, component]) for instant in self.model.steps.instants):
                     raise each.card.error(
                         f"node {self.model.mesh.numbers[node]} belongs to no element, its component "
                         f"{component + 1} in an equation must have a value in all steps: give it by "
@@ -417,13 +417,13 @@ class Holding:
                 found.append(ConstraintTerm(body, own, vectors, factor[here], number[here]))
         return found
 
-    def equation_values(self, moment: Moment) -> dict[str, Any] | None:
+    def equation_values(self, instant: Instant) -> dict[str, Any] | None:
         """Return the values of the equations at a time, of nodes without elements; None without any."""
         number, node, component, factor = self._entries
         outside = ~self.model.nodes_of_bodies()[node]
         if not outside.any():
             return None
-        count, moved = int(number.max()) + 1, moment.held[node[outside], component[outside]]
+        count, moved = int(number.max()) + 1, instant.held[node[outside], component[outside]]
         return {"EQUATIONS": -np.bincount(number[outside], factor[outside] * moved, count)}
 
     def preloads(self) -> list[Preload]:
