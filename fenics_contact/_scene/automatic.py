@@ -13,16 +13,15 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.corners import exchanged, is_held, with_corner_as_slave
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
 from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._scene.surface_laws import ClosureLaw, check_closing
-from fenics_contact._surfaces.corners import corners_over
-from fenics_contact._surfaces.projection import project
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces, computed_rounding, corners_of
+from fenics_contact.mesh.faces import boundary_faces, corners_of
 from fenics_contact.mesh.near_surfaces import near_surfaces
 
 if TYPE_CHECKING:
@@ -150,31 +149,15 @@ class AutomaticContact(Sequence[ContactPair]):
         sides = Surface(one, f"near {other}"), Surface(other, f"near {one}")
         pair = ContactPair(*sides, self.friction, self.discretisation, self.geometry, closure=self.closure)
         sizes = [_size(scene.bodies[side.body].mesh, side.name) for side in sides]
-        held = [bool(scene.fixed(side.body)[np.unique(scene.facets(side))].all()) for side in sides]
+        held = [is_held(scene, side) for side in sides]
         alike = max(sizes) <= 1.1 * min(sizes)
         other_is_better = master_share(scene, pair) > 0.5 if alike else sizes[1] < sizes[0]
         orders = [scene.bodies[side.body].mesh.order for side in sides]
         if orders[0] != orders[1]:  # what a linear master cannot follow, a quadratic slave presses on
             other_is_better = orders[1] < orders[0]
-        corners = [_touches_with_a_corner(scene, *each) for each in (sides, sides[::-1])]
-        if corners[0] != corners[1]:  # which a slave misses between its nodes
-            other_is_better = corners[1]
         if held[0] != held[1]:  # nodes that cannot move carry no multipliers
             other_is_better = held[0]
-        return replace(pair, slave=sides[1], master=sides[0]) if other_is_better else pair
-
-
-def _touches_with_a_corner(scene: SceneParts, side: Surface, other: Surface) -> bool:
-    """Return whether a corner or an edge of a side is nearest to the other one."""
-    from fenics_contact._scene.parts import sharp_at, surface_of
-
-    own, opposite = (surface_of(scene, each, "faceted") for each in (side, other))
-    sharp = np.flatnonzero(sharp_at(scene, side))
-    _, hit = corners_over(own, sharp, opposite)
-    if not len(hit.point):
-        return False
-    nearest = project(own.points, own.normals, opposite).gap.min()
-    return bool(hit.gap.min() <= nearest + computed_rounding(own.points))
+        return with_corner_as_slave(scene, exchanged(pair) if other_is_better else pair)
 
 
 def _facet_size(mesh: BodyMesh) -> float:

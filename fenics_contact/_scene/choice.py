@@ -12,14 +12,18 @@ class Choice:
     Attributes:
         found: It, empty where none was chosen.
         why: In words.
+        exchanged: Whether slave and master were exchanged.
         stays: Whether other meshes do not change it.
     """
 
     found: str = ""
     why: str = ""
+    exchanged: bool = False
     stays: bool = False
 
 
+#: What is added where slave and master were exchanged.
+EXCHANGED = "; slave and master are exchanged, as a corner or an edge of this slave touches first"
 #: Of pairs whose discretisation is given.
 NO_CHOICE = Choice()
 
@@ -37,6 +41,10 @@ class Chosen:
 
     @property
     def reason(self) -> str:
-        """Why the scene chose the discretisation that it has, in words; empty where it was given."""
-        chosen = self.choice.found == self.discretisation
-        return f"{self.choice.found}, {self.choice.why}" if chosen else ""
+        """Why the scene chose the discretisation that it has, and whether it exchanged slave and master.
+
+        In words; empty where it was given.
+        """
+        if self.choice.found != self.discretisation:
+            return ""
+        return f"{self.choice.found}, {self.choice.why}{EXCHANGED if self.choice.exchanged else ''}"

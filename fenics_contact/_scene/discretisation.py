@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar, cast
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._scene.choice import Choice
+from fenics_contact._scene.corners import with_corner_as_slave
 from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface
 from fenics_contact._scene.parts import SceneParts
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact._surfaces.projection import surfaces_match
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import vector_areas
 from fenics_contact.mesh.near_surfaces import FACING
+
+_LOG = logging.getLogger(__name__)
 
 #: Why every contact with an obstacle is by nodes.
 RIGID = "as the master is rigid"
@@ -58,16 +63,31 @@ def _with_choice(scene: SceneParts, pair: Pair) -> Pair:
     chosen = pair.discretisation in ("best", pair.choice.found)
     if not chosen or pair.choice.stays:
         return pair
-    found, why = _choice(scene, pair)
-    choice = Choice(found, why)
-    return pair if pair.choice == choice else replace(pair, discretisation=found, choice=choice)
+    better = _with_better_slave(scene, pair) if pair.discretisation == "best" else pair
+    found, why = _choice(scene, better)
+    choice = Choice(found, why, exchanged=better is not pair or pair.choice.exchanged)
+    return pair if pair.choice == choice else replace(better, discretisation=found, choice=choice)
+
+
+def _with_better_slave(scene: SceneParts, pair: Pair) -> Pair:
+    """Return a pair, exchanged where its master touches first with a corner, if it may be."""
+    if not isinstance(pair, ContactPair) or not isinstance(pair.master, Surface):
+        return pair
+    if pair.within_body or pair.depends_on_slave:
+        return pair
+    better = with_corner_as_slave(scene, pair)
+    if better is pair or better.place in [each.place for each in scene.contacts]:
+        return pair
+    words = "slave and master of %s are exchanged, as a corner or an edge of %s touches first"
+    safe_log(_LOG.info, words, pair.place, better.slave.in_words)
+    return cast("Pair", better)
 
 
 def _kept(pair: Pair) -> Pair:
     """Return a pair whose choice does not depend on meshes any more."""
     if pair.choice.found != pair.discretisation:
         return pair
-    return replace(pair, choice=Choice(pair.discretisation, REMESHED, stays=True))
+    return replace(pair, choice=replace(pair.choice, why=REMESHED, stays=True))
 
 
 def _choice(scene: SceneParts, pair: ContactPair | AnyTie) -> tuple[Discretisation, str]:

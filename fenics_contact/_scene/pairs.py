@@ -135,7 +135,10 @@ class ContactPair(Chosen):
     """Two surfaces that may touch. The slave may not penetrate the master.
 
     Attributes:
-        slave: Surface whose nodes carry the contact forces: the finer or softer one.
+        slave: Surface whose nodes carry the contact forces: the finer or softer one, or that with a corner
+            or an edge that touches. With ``discretisation="best"`` the scene exchanges both sides where the
+            master alone has one that touches first, see ``reason``, unless functions of points, gaps, nodes
+            or a fluid are given, which belong to the slave.
         master: Surface of another body, or a rigid obstacle; another one of the same body where it
             deforms so much that these meet.
         friction: Law of friction; without one (None) contact is frictionless.
@@ -228,6 +231,13 @@ class ContactPair(Chosen):
 
     def _facts(self) -> dict[str, Any]:
         return facts_of_pair(self)
+
+    @property
+    def depends_on_slave(self) -> bool:
+        """Whether something is given of the slave's points, so that the other side cannot take its place."""
+        measured = self.gap is None and self.adjust is None and self.interference in (None, "measured")
+        varies = self.friction_varies or callable(self.shear_limit)
+        return varies or not measured or self.nodes is not None or self.fluid is not None
 
     @property
     def place(self) -> str:

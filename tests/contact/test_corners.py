@@ -15,6 +15,9 @@ from fenics_contact import (
     BodyMesh,
     ContactPair,
     ContactProblem,
+    Coulomb,
+    FluidPressure,
+    LinearClosure,
     LoadStep,
     Scene,
     State,
@@ -24,6 +27,7 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact._pairing.mortar.coupling import mortar_coupling
+from fenics_contact._scene.discretisation import EXCHANGED, keeping_discretisation
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke, PlaneStrain
 from fenics_contact.results.resolution import CALL, CornerBetweenNodes, CornerKeptAway
@@ -136,6 +140,94 @@ def test_automatic_contact_takes_the_body_with_the_corner_for_the_slave(strain: 
     require_upright(force_on(state), float(np.linalg.norm(force_on(right))))
 
 
+def floor_as_slave(
+    strain: str = "small", bar: str = "bar under", bodies: tuple[str, ...] = ("floor", "bar"), **given: Any
+) -> Scene:
+    """The bar on its corner, the floor named as slave; some bodies whole supports hold."""
+    floor, name = rectangle((-2, -1), (2, 0), (9, 4)), bar.split()[1]
+    mesh = turned_in_plane(rectangle((0, 0), (1, 2), (5, 10)), TURN, ("y0", "x0"))
+    made = {"floor": Body(floor, MATERIALS[strain]), "bar": Body(mesh, MATERIALS[strain])}
+    pair = ContactPair(Surface("floor", "y1"), Surface("bar", name), **given)
+    held = [] if "bar" in bodies else [Support("bar", name)]
+    supports = [Support("floor", "y0"), Support("bar", "y1", (0.0, -0.05)), *held]
+    return Scene(made, supports, contacts=[pair])
+
+
+@pytest.mark.parametrize("cells", [5, 20])
+@pytest.mark.parametrize("strain", MATERIALS)
+def test_a_floor_named_as_slave_is_pressed_straight_down(
+    strain: str, cells: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    material = MATERIALS[strain]
+    by_nodes = pressed(material, "bar under", "floor y1", "node", cells)
+    with caplog.at_level("INFO"):
+        state = pressed(material, "floor y1", "bar under", "best", cells)
+    require_upright(force_on(state), float(np.linalg.norm(force_on(by_nodes))))
+    (pair,) = state.scene.contacts
+    assert pair.place == "bar under on floor y1"
+    assert pair.reason == f"mortar, as the meshes do not match{EXCHANGED}"
+    assert [contact.discretisation for contact in state.scene.plan().contacts] == [pair.reason]
+    found = [each for each in caplog.messages if "exchanged" in each]
+    words = "slave and master of floor y1 on bar under are exchanged, as a corner or an edge of bar under"
+    assert found
+    assert all(each.startswith(words) for each in found)
+
+
+def test_a_corner_whose_face_is_steep_takes_the_place_of_the_floor_as_well() -> None:
+    """By nodes then, as no facets face each other."""
+    state = solve_scene(floor_as_slave(bar="bar x0"), MPI.COMM_SELF)
+    (pair,) = state.scene.contacts
+    assert pair.place == "bar x0 on floor y1"
+    assert pair.reason.startswith("node, as no facets face each other")
+    by_nodes = pressed(MATERIALS["small"], "bar under", "floor y1", "node")
+    require_upright(force_on(state), float(np.linalg.norm(force_on(by_nodes))))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"gap": 0.0},
+        {"interference": lambda x: 0.0 * x[:, 0]},
+        {"adjust": 0.01},
+        {"friction": Coulomb(lambda x: 0.1 + 0.0 * x[:, 0])},
+        {"friction": Coulomb(0.3, shear_limit=lambda x: 1.0 + 0.0 * x[:, 0])},
+        {"fluid": FluidPressure(1.0, "x0")},
+        {"discretisation": "mortar"},
+        {"discretisation": "node"},
+        {"bodies": ("floor",)},
+    ],
+    ids=lambda given: "".join(given),
+)
+def test_a_slave_stays_where_something_belongs_to_it_or_is_asked_for(given: dict[str, Any]) -> None:
+    (pair,) = floor_as_slave(**given).contacts
+    assert pair.slave == Surface("floor", "y1")
+    assert EXCHANGED not in pair.reason
+
+
+def test_pairs_of_both_orders_stay_as_they_are() -> None:
+    scene = floor_as_slave(discretisation="node")
+    given = ContactPair(Surface("floor", "y1"), Surface("bar", "under"))
+    both = [given, replace(given, slave=given.master, master=given.slave)]
+    assert [pair.slave.body for pair in replace(scene, contacts=both).contacts] == ["floor", "bar"]
+
+
+def test_an_exchanged_pair_stays_so_in_load_steps_designs_and_other_meshes() -> None:
+    scene = floor_as_slave("large", interference="measured", closure=LinearClosure(1e6))
+    (pair,) = scene.contacts
+    assert pair.reason.endswith(EXCHANGED)
+    named = ContactPair(Surface("floor", "y1"), Surface("bar", "under"))
+    rough = [replace(each, friction=Coulomb(0.1)) for each in (pair, named)]
+    flat = scene.bodies["bar"].mesh.moved(rectangle((0, 0), (1, 2), (5, 10)).points)
+    moved = {**scene.bodies, "bar": replace(scene.bodies["bar"], mesh=flat)}
+    others = [
+        replace(scene, bodies=moved),
+        replace(keeping_discretisation(scene), bodies=moved),
+        *(LoadStep("rough", contacts=[each]).applied_to(scene) for each in rough),
+    ]
+    assert [each.contacts[0].place for each in others] == ["bar under on floor y1"] * 4
+    assert [each.contacts[0].reason.endswith(EXCHANGED) for each in others] == [True, False, True, True]
+
+
 def test_a_corner_of_the_master_that_is_kept_away_is_named(caplog: pytest.LogCaptureFixture) -> None:
     there = {"angle": np.radians(70.0), "offset": -0.16}
     state = pressed(MATERIALS["large"], "floor y1", "bar under", "mortar", **there)
@@ -185,15 +277,15 @@ def test_an_edge_in_space_presses_along_the_normal_of_the_floor(cells: str) -> N
     floor = block((-1, -0.5, -1), (1, 1.5, 0), (5, 5, 2), cells)
     bar = turned_in_plane(block((0, 0, 0), (1, 1, 1), (5, 3, 5), cells), TURN, ("z0", "x0"))
     material = IsotropicElasticity(1000.0, 0.3)
-    forces = {}
-    for kind in ("node", "mortar"):
-        sides = Surface("bar", "under"), Surface("floor", "z1")
-        pair = ContactPair(*sides, discretisation=kind)  # type: ignore[arg-type]
+    forces, sides = {}, (Surface("bar", "under"), Surface("floor", "z1"))
+    for kind, (slave, master) in (("node", sides), ("mortar", sides), ("best", sides[::-1])):
+        pair = ContactPair(slave, master, discretisation=kind)  # type: ignore[arg-type]
         supports = [Support("floor", "z0"), Support("bar", "z1", (0.0, 0.0, -0.05))]
         scene = Scene({"floor": Body(floor, material), "bar": Body(bar, material)}, supports, contacts=[pair])
         forces[kind] = force_on(solve_scene(scene, MPI.COMM_SELF), "floor z0")
     assert np.linalg.norm(forces["node"]) > 1.0
-    require_upright(forces["mortar"], float(np.linalg.norm(forces["node"])))
+    for kind in ("mortar", "best"):
+        require_upright(forces[kind], float(np.linalg.norm(forces["node"])))
 
 
 @pytest.mark.parametrize("strain", ["small", "large"])
@@ -203,10 +295,9 @@ def test_a_sharp_ring_presses_along_the_axis(strain: str) -> None:
     floor = rectangle((0, -1), (4, 0), (9, 4))
     ring = turned_in_plane(rectangle((0, 0), (1, 1), (5, 5)), TURN, ("y0", "x0"))
     ring = replace(ring, points=ring.points + np.array([2.0, 0.0]))
-    forces = {}
-    for kind in ("node", "mortar"):
-        sides = Surface("ring", "under"), Surface("floor", "y1")
-        pair = ContactPair(*sides, discretisation=kind, geometry="faceted")  # type: ignore[arg-type]
+    forces, sides = {}, (Surface("ring", "under"), Surface("floor", "y1"))
+    for kind, (slave, master) in (("node", sides), ("mortar", sides), ("best", sides[::-1])):
+        pair = ContactPair(slave, master, discretisation=kind, geometry="faceted")  # type: ignore[arg-type]
         supports = [Support("floor", "y0"), Support("ring", "y1", (0.0, -0.05))]
         bodies = {
             "floor": Body(floor, material, axisymmetric=True),
@@ -215,7 +306,8 @@ def test_a_sharp_ring_presses_along_the_axis(strain: str) -> None:
         contact = solve_scene(Scene(bodies, supports, contacts=[pair]), MPI.COMM_SELF).contact
         forces[kind] = contact.normal_force @ contact.points.normal
     assert forces["node"][1] > 10.0
-    require_upright(forces["mortar"], float(forces["node"][1]))
+    for kind in ("mortar", "best"):
+        require_upright(forces[kind], float(forces["node"][1]))
 
 
 def test_a_tip_slides_along_a_floor_and_over_its_edge_as_by_nodes() -> None:

@@ -1,0 +1,50 @@
+"""Pairs in which one side touches the other with a corner or an edge: that side is the better slave.
+
+A slave's constraints lie at its nodes, or are means around them. Those of the other side miss a corner that
+presses between them, or turn and halve its force.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.parts import SceneParts, sharp_at, surface_of
+from fenics_contact._surfaces.corners import corners_over
+from fenics_contact._surfaces.projection import project
+from fenics_contact.mesh.faces import computed_rounding
+
+
+def with_corner_as_slave(scene: SceneParts, pair: ContactPair) -> ContactPair:
+    """Return a pair of two bodies, exchanged if its master alone touches first with a corner, and is free."""
+    slave, master = pair.slave, pair.master
+    assert isinstance(master, Surface)
+    if not _touches_with_a_corner(scene, master, slave) or is_held(scene, master):
+        return pair
+    return pair if _touches_with_a_corner(scene, slave, master) else exchanged(pair)
+
+
+def exchanged(pair: ContactPair) -> ContactPair:
+    """Return a pair of two bodies with the other slave."""
+    assert isinstance(pair.master, Surface)
+    return replace(pair, slave=pair.master, master=pair.slave)
+
+
+def is_held(scene: SceneParts, side: Surface) -> bool:
+    """Return whether supports hold all nodes of a surface, so that these carry no multipliers."""
+    return bool(scene.fixed(side.body)[np.unique(scene.facets(side))].all())
+
+
+def _touches_with_a_corner(scene: SceneParts, side: Surface, other: Surface) -> bool:
+    """Return whether a corner or an edge of a side is nearest to the other one, see `corners_over`."""
+    sharp = np.flatnonzero(sharp_at(scene, side))
+    if not len(sharp):
+        return False
+    own, opposite = (surface_of(scene, each, "faceted") for each in (side, other))
+    _, hit = corners_over(own, sharp, opposite)
+    if not len(hit.point):
+        return False
+    nearest = project(own.points, own.normals, opposite).gap.min()
+    return bool(hit.gap.min() <= nearest + computed_rounding(own.points))
