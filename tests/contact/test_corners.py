@@ -265,6 +265,21 @@ def test_a_face_too_steep_to_face_the_floor_touches_by_its_nodes() -> None:
     require_upright(force_on(state), float(size))
 
 
+@pytest.mark.parametrize(("cells", "passes"), [(16, False), (20, True)])
+def test_a_steep_face_alone_is_right_or_the_face_that_passes_is_named(
+    cells: int, passes: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    """With large strains and cells small enough the other face beside the corner touches, too."""
+    size = np.linalg.norm(force_on(pressed(MATERIALS["large"], "bar under", "floor y1", "node", cells)))
+    caplog.clear()
+    force = force_on(pressed(MATERIALS["large"], "bar x0", "floor y1", "best", cells))
+    words = "bodies 'floor' and 'bar' pass into each other at 1 facet, outside the surfaces of their pairs"
+    assert any(each.startswith(words) for each in caplog.messages) == passes
+    if not passes:
+        return require_upright(force, float(size))
+    assert np.linalg.norm(force) < 0.98 * size
+
+
 @pytest.mark.parametrize("angle", [35.0, 45.0])
 def test_both_faces_of_a_corner_may_face_the_floor(angle: float) -> None:
     state = pressed(MATERIALS["small"], "bar under", "floor y1", "mortar", angle=np.radians(angle))
