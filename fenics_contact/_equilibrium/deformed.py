@@ -13,6 +13,7 @@ from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.other_rows import prescribed_as_is
 from fenics_contact._equilibrium.outer_loops import outer_loops
+from fenics_contact._equilibrium.previous import Previous, Wanted
 from fenics_contact._equilibrium.starts import CoarseStart, carried_over
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
@@ -47,7 +48,7 @@ from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.deformed_state import DeformedState, row_values_at
 from fenics_contact.results.dual_solve import contact_result
 from fenics_contact.results.rigid_motions import UnheldMotion
-from fenics_contact.results.state import Energies, State, Tolerance, softened
+from fenics_contact.results.state import Energies, State, softened
 
 if TYPE_CHECKING:
     from fenics_contact._pairing.sliding.slip import MaterialPoints
@@ -76,29 +77,18 @@ class DeformedEquilibria:
         self._unresisted: tuple[UnheldMotion, ...] | None = None
         self._places = InFacets.none(scene.dim)
 
-    def solve(
-        self,
-        scene: Scene,
-        before: State | CarriedState | None,
-        tolerance: Tolerance,
-        time: float,
-        step: LoadStep | None = None,
-        *,
-        overlap: bool = False,
-        start: State | CoarseStart | None = None,
-        most: int = 4,
-    ) -> DeformedState:
+    def solve(self, scene: Scene, previous: Previous, wanted: Wanted, most: int = 4) -> DeformedState:
         """Compute the equilibrium of a scene. Collective.
 
         `most`: how often other points are looked for, inside facets that are pierced between their nodes.
         """
-        places = _places_of(before, scene.dim)
-        inside = InsideFacets(scene.dim, on_the_way=before is not None)
-        state: DeformedState | None = None
+        places, in_later_step = _places_of(previous.before, scene.dim), previous.before is not None
+        inside, state = InsideFacets(scene.dim, on_the_way=in_later_step), None
+        overlap = wanted.design or previous.is_coarser
         for _ in range(1 + (0 if overlap else most)):
             self._put_inside(places)
             try:
-                state = self._solve(scene, before, tolerance, time, step, overlap=overlap, start=start)
+                state = self._solve(scene, previous, wanted)
             except LoadStepError as failure:
                 if not len(places.point):
                     raise
@@ -110,7 +100,7 @@ class DeformedEquilibria:
             places = found.by_key(state.contact.points)
         if state is None:
             self._put_inside(InFacets.none(scene.dim))
-            return self._solve(scene, before, tolerance, time, step, overlap=overlap, start=start)
+            return self._solve(scene, previous, wanted)
         self._put_inside(_places_of(state, scene.dim))
         return state
 
@@ -119,25 +109,15 @@ class DeformedEquilibria:
         self._places = places
         self._equations.contact.put_inside(places)
 
-    def _solve(
-        self,
-        scene: Scene,
-        before: State | CarriedState | None,
-        tolerance: Tolerance,
-        time: float,
-        step: LoadStep | None,
-        *,
-        overlap: bool,
-        start: State | CoarseStart | None,
-    ) -> DeformedState:
-        steps = self._steps
-        if tolerance is not None:
-            if not isinstance(tolerance, float):
+    def _solve(self, scene: Scene, previous: Previous, wanted: Wanted) -> DeformedState:
+        steps, step, before = self._steps, wanted.step, previous.before
+        if wanted.tolerance is not None:
+            if not isinstance(wanted.tolerance, float):
                 raise InvalidInputError(
-                    f"the tolerance of nonlinear materials must be a number, got {tolerance!r}: their errors "
-                    "are not estimated; leave it out for 1e-8"
+                    f"the tolerance of nonlinear materials must be a number, got {wanted.tolerance!r}: their "
+                    "errors are not estimated; leave it out for 1e-8"
                 )
-            steps = replace(steps, newton=replace(steps.newton, tolerance=tolerance))
+            steps = replace(steps, newton=replace(steps.newton, tolerance=wanted.tolerance))
         equations, timer = self._equations, self._timer
         acted, begin, known = None, equations.at_rest(), None
         with timer.phase("assemble"):
@@ -151,9 +131,10 @@ class DeformedEquilibria:
                 same = same and self._places.are_those_of(_places_of(before, scene.dim))
                 if not (same and contacts_alike(scene, before.scene)):
                     (acted, begin), known = self._held_otherwise(scene, before), None
-        self._require_later(scene, begin.time, time)
+        self._require_later(scene, begin.time, wanted.time)
         with timer.phase("assemble"):
-            load = self._loading(scene, time, step, overlap)
+            overlap = wanted.design or previous.is_coarser
+            load = self._loading(scene, wanted.time, step, overlap)
             if isinstance(before, DeformedState) and acted is not None:
                 if scene.preloads:
                     acted = drawn_as(before, acted, load)
@@ -164,7 +145,7 @@ class DeformedEquilibria:
                 self._unresisted = unresisted_motions(load.torn)
             require_resisted(self._unresisted, load.torn, load.prescribed)
         try:
-            near = self._near(load, start) if before is None else None
+            near = self._near(load, previous.start) if before is None else None
             path = steps.follow(
                 equations, acted, load, begin, timer, known, held=not self._unresisted, near=near
             )
@@ -209,7 +190,7 @@ class DeformedEquilibria:
         same = self.decomposition is decomposition and scene.has_meshes_of(self.scene)
         return same and contacts_alike(scene, self.scene)
 
-    def restored(self, stored: Stored, scene: Scene) -> DeformedState:
+    def restored(self, stored: Stored, scene: Scene, known: State | None = None) -> DeformedState:
         """Build a state from what `stored_deformed` returned, with one factorisation. Collective."""
         timer, equations = self._timer, self._equations
         self._put_inside(InFacets.restored(stored, scene.dim))

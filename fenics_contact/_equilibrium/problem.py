@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,293 +14,29 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
-from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes, with_places
 from fenics_contact._equilibrium.carried import CarriedState
-from fenics_contact._equilibrium.followed_loads import FollowedLoads
-from fenics_contact._equilibrium.other_rows import has_rows_of, on_rows_of, with_kept
-from fenics_contact._equilibrium.outer_loops import OuterLoop, nested, outer_loops
-from fenics_contact._equilibrium.passes import Passes
-from fenics_contact._equilibrium.starts import (
-    CoarseStart,
-    checked_start,
-    first_guess,
-    known_system,
-    solve_from_coarse,
-)
-from fenics_contact._equilibrium.static_admissibility import check_held
-from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
+from fenics_contact._equilibrium.linear import DirectEquilibria, LinearEquilibria, default_solver
+from fenics_contact._equilibrium.previous import Equilibria, Previous, Wanted
+from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._equilibrium.warnings import ContactWarnings
-from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.memory import Fit
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.plan import SolverKind, choose_solver
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.sections import held_at
-from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.decomposition import Decomposition, decompose
-from fenics_contact.feti.direct import DirectSystem
-from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.same_input import check_same_input
-from fenics_contact.feti.torn import TornSystem, build_torn_system, check_apart, with_points_inside
-from fenics_contact.qp.face_newton import ProjectedCG
-from fenics_contact.qp.in_turn import InTurn
-from fenics_contact.qp.solution import DualSolution
+from fenics_contact.feti.torn import check_apart
 from fenics_contact.qp.solve import DualSolver
-from fenics_contact.results.contact import no_contact
-from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual, sticking
 from fenics_contact.results.linear_state import LinearState
-from fenics_contact.results.preloads import shortenings
-from fenics_contact.results.state import State, Tolerance, checked_tolerance, compute_energies
+from fenics_contact.results.state import State, Tolerance, checked_tolerance
 
 if TYPE_CHECKING:
-    from fenics_contact._accuracy.state_errors import BalancedTolerance
-    from fenics_contact._equilibrium.balancing import Solve
     from fenics_contact._equilibrium.deformed import DeformedEquilibria
     from fenics_contact._large_deformations.load_steps import AutomaticSteps
     from fenics_contact.mesh.refinement import Refinement
     from fenics_contact.results.deformed_state import AnyState
-
-
-#: Largest relative residual of a scene without contact; its solution then equals that of a direct solver.
-LINEAR_TOLERANCE = 1e-10
-
-
-class LinearEquilibria:
-    """Equilibria of linear materials on the subdomains of one decomposition."""
-
-    def __init__(self, decomposition: Decomposition, solver: DualSolver | None, timer: PhaseTimer) -> None:
-        """Prepare; ``solver`` is None for that of each scene's plan."""
-        self._decomposition, self._solver, self._timer = decomposition, solver, timer
-
-    def solve(
-        self,
-        scene: Scene,
-        kind: SolverKind,
-        tolerance: Tolerance,
-        *,
-        start: State | CoarseStart | None,
-        before: State | CarriedState | None,
-        known: State | None,
-        design: bool,
-    ) -> LinearState:
-        """Compute the equilibrium of a scene. Collective.
-
-        Args:
-            start: State whose multipliers come first, also one on coarser meshes, or None.
-            before: State from which slip is measured, also one on other meshes, or None.
-            known: State of which parts may be reused, or None.
-
-        Raises:
-            InfeasibleError: If nothing holds some body.
-            ConvergenceError: If the solver does not reach its tolerance.
-        """
-        with self._timer.phase("assemble"):
-            # What the facets of a coarse mesh explained, a finer one has kept: a warning names it.
-            torn = self._torn(scene, known, overlap=design or isinstance(start, CoarseStart))
-            if before is not None:
-                torn = torn.with_slip_from(*self._slip_origin(before, torn))
-            same = known is not None and torn.points is known.torn.points
-            if known is None or not same or _loads_of(torn.scene) != _loads_of(known.scene):
-                check_held(torn)
-        if self._solver is None and kind is SolverKind.DIRECT:
-            return self._directly(torn, known)
-
-        def solved(
-            system_of: TornSystem, first: State | CoarseStart | None, reusable: State | None
-        ) -> LinearState:
-            return self._solved(
-                system_of, kind, tolerance, start=first, before=before, known=reusable, design=design
-            )
-
-        state = solved(torn, start, known)
-        if design or scene.torsion or not scene.contacts:
-            return state
-        return self._with_points_inside(state, before, solved)
-
-    def _with_points_inside(
-        self,
-        state: LinearState,
-        before: State | CarriedState | None,
-        solved: Callable[[TornSystem, State | CoarseStart | None, State | None], LinearState],
-        most: int = 4,
-    ) -> LinearState:
-        """Return the state in which facets press that lie between nodes in a master. Collective.
-
-        `most`: how often other points are looked for; what a state still misses is a warning.
-        """
-        torn, passes = state.torn, Passes(lambda system_of, last: solved(system_of, last, None), None)
-        passes.add(state)
-        inside = InsideFacets(torn.scene.dim)
-        for _ in range(most):
-            with self._timer.phase("state"):
-                places = inside.after(state, needed_nodes(state, torn.points))
-            if places is None:
-                break
-            with self._timer.phase("assemble"):
-                others = with_places(torn, places)
-                others = others.with_slip_from(*self._slip_origin(before, others)) if before else others
-            state = passes.run(others)
-        return state if passes.count == 1 else passes.answer(state)
-
-    def _solved(
-        self,
-        torn: TornSystem,
-        kind: SolverKind,
-        tolerance: Tolerance,
-        *,
-        start: State | CoarseStart | None,
-        before: State | CarriedState | None,
-        known: State | None,
-        design: bool,
-    ) -> LinearState:
-        """Compute the equilibrium of a system. Collective."""
-        solver, reused = self._solver or default_solver(kind), known_system(known)
-        # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
-        if tolerance is None and (self._solver is not None or design):
-            tolerance = solver.tolerance
-        loops = outer_loops(torn.scene)
-        if loops:
-            assert not isinstance(before, CarriedState)  # refused by its check
-            if design:
-                for loop in loops:
-                    loop.require_derivatives(torn, before)
-            return self._by_passes(torn, loops, tolerance, solver, start, known, before)
-        system = DualSystem(torn, self._timer, previous=reused)
-        with self._timer.phase("solve"):
-            first = first_guess(start, system)
-        alone = solve_from_coarse if isinstance(start, CoarseStart) else solve_dual
-        solve = alone if reused is None else FollowedLoads(reused, self._timer).solve
-        if not isinstance(tolerance, float):
-            return self._balanced(system, solve, solver, tolerance, first)
-        with self._timer.phase("solve"):
-            solution = solve(system, solver.with_tolerance(tolerance), first)
-        return self._state(system, solution, tolerance=tolerance)
-
-    def _slip_origin(self, before: State | CarriedState, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
-        """Return from where a system measures slip. Collective."""
-        if isinstance(before, CarriedState):
-            scene = before.scene_on(torn.scene)
-            was = build_torn_system(scene, self._decomposition, overlap=True, previous=torn)
-            return before.slip_origin(with_points_inside(was, torn))
-        if has_rows_of(before, torn):
-            own = before.torn
-            sticks = sticking(own, before.rows) if own.tangential_rows.size else False
-            return own.slip_origin(before.torn_displacement, before.solution.multiplier, sticks)
-        was, multiplier = on_rows_of(before, torn)
-        return was.slip_origin(before.torn_displacement, multiplier)
-
-    def _by_passes(
-        self,
-        torn: TornSystem,
-        loops: Sequence[OuterLoop],
-        tolerance: Tolerance,
-        solver: DualSolver,
-        start: State | CoarseStart | None,
-        known: State | None,
-        before: State | None,
-    ) -> LinearState:
-        """Compute a state that agrees with what its outer loops find. Collective."""
-        # They need the status of every point, which a balanced state leaves uncertain.
-        wanted = tolerance if isinstance(tolerance, float) else solver.tolerance
-        finest = min(loop.pass_tolerance(wanted) for loop in loops)
-
-        def solve(system_of: TornSystem, last: LinearState | None) -> LinearState:
-            reused = known_system(last)
-            system = DualSystem(system_of, self._timer, previous=reused)
-            with self._timer.phase("solve"):
-                first = first_guess(last or start, system)
-                solution = solve_dual(system, solver.with_tolerance(finest), first)
-            return self._state(system, solution, tolerance=wanted)
-
-        first = known if isinstance(known, LinearState) else None
-        return nested(loops, solve, first, before, wanted)(torn, first)
-
-    def restored(self, stored: Stored, scene: Scene, known: State | None) -> LinearState:
-        """Build a state from what `stored_state` returned, with at most one product. Collective."""
-        torn = self._torn(scene, known, overlap=True)
-        if not stored:
-            return self._directly(torn, known)
-        with self._timer.phase("assemble"):
-            torn = with_stored_slip(with_places(torn, InFacets.restored(stored, scene.dim)), stored)
-        for loop in outer_loops(scene):
-            torn = loop.restored(torn, stored)
-        system = DualSystem(torn, self._timer, previous=known_system(known))
-        with self._timer.phase("state"):
-            solution = restored_solution(system, stored)
-        return self._state(system, solution)
-
-    def _state(
-        self, system: DualSystem, solution: DualSolution, displacement: np.ndarray | None = None, **known: Any
-    ) -> LinearState:
-        """Return the state of a solution; its torn displacement is computed unless given. Collective."""
-        torn = system.torn
-        with self._timer.phase("state"):
-            if displacement is None:
-                displacement = system.displacement(solution.multiplier, solution.alpha)
-            contact = contact_result(torn, row_values(system, solution), displacement)
-            friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
-            rigid = system.kernel @ solution.alpha
-            energies = compute_energies(torn, displacement, solution.multiplier, friction, rigid)
-        return LinearState(
-            torn=torn, system=system, solution=solution, torn_displacement=displacement, contact=contact,
-            energies=energies, seconds=dict(self._timer.seconds), **known,
-        )  # fmt: skip
-
-    def _torn(self, scene: Scene, known: State | None, *, overlap: bool) -> TornSystem:
-        previous = None if known is None else known.torn
-        return build_torn_system(scene, self._decomposition, overlap=overlap, previous=previous)
-
-    def _directly(self, torn: TornSystem, known: State | None) -> LinearState:
-        """Compute the state of one body without multipliers."""
-        earlier = known.system if isinstance(known, LinearState) else None
-        reused = earlier if isinstance(earlier, DirectSystem) else None
-        system = DirectSystem(torn, self._timer, previous=reused)
-        with self._timer.phase("solve"):
-            solution = system.solve()
-        return LinearState(
-            torn=torn, system=system, solution=solution, torn_displacement=solution.displacement,
-            contact=no_contact(torn.points), seconds=dict(self._timer.seconds),
-            energies=compute_energies(torn, solution.displacement, solution.multiplier, 0.0),
-        )  # fmt: skip
-
-    def _balanced(
-        self,
-        system: DualSystem,
-        solve: Solve,
-        solver: DualSolver,
-        balanced: BalancedTolerance | None,
-        start: np.ndarray | None,
-    ) -> LinearState:
-        """Compute the state as accurately as the mesh deserves."""
-        # A fixed tolerance needs no estimates and should not import them.
-        from fenics_contact._accuracy.state_errors import BalancedTolerance
-        from fenics_contact._equilibrium.balancing import solve_balanced
-
-        wanted = balanced or BalancedTolerance()
-        rounds = solve_balanced(system, solve, solver, wanted, start, self._timer)
-        state = self._state(system, rounds.solution, rounds.displacement, tolerance=wanted)
-        return replace(state, known_errors=rounds.state_errors(state.energies.norm))
-
-
-def default_solver(kind: SolverKind) -> DualSolver:
-    """Return the dual solver of a kind, with its tolerance."""
-    if kind is SolverKind.FACE_NEWTON:
-        return InTurn()
-    return ProjectedCG(tolerance=LINEAR_TOLERANCE)
-
-
-def _loads_of(scene: Scene) -> tuple[list[Any], ...]:
-    """Return the loads of a scene, the rigid surfaces, at whose points loads act, preloads and springs."""
-    rigid = [each for each in scene.supports if isinstance(each, RigidSurface)]
-    return list(scene.loads), rigid, list(scene.preloads), list(scene.springs)
-
-
-def _lengths_after(before: State | None, scene: Scene) -> np.ndarray:
-    """Return the shortenings of preloads at the end of the load step before. Collective."""
-    if before is None or not before.scene.preloads:
-        return np.zeros(len(scene.preloads))
-    return shortenings(before.torn, before.torn_displacement)
 
 
 @displayed
@@ -511,37 +247,24 @@ class ContactProblem:
             >>> state = fine.solve(start=coarse, refinements={"block": finer})  # doctest: +SKIP
         """
         check_not_forked()
-        scene = self.scene if scene is None else scene
-        time = 1.0 if step is None or step.time is None else step.time
+        scene, previous = self.scene if scene is None else scene, Previous(before)
         with together(self.comm):
-            _require_obstacles_at(scene, time)
-            wanted = checked_tolerance(self.tolerance if tolerance is None else tolerance)
-            if isinstance(before, CarriedState):
-                before.check(scene)
-        last = before.state if isinstance(before, CarriedState) else before
-        if not isinstance(before, CarriedState):
-            scene = with_kept(scene, before)
-        if scene.preloads:
-            scene = replace(scene, preloads=held_at(scene, _lengths_after(last, scene)))
-        kind = self._kind(scene, sensitivity=design or adjoint)
+            accuracy = checked_tolerance(self.tolerance if tolerance is None else tolerance)
+            wanted = Wanted(accuracy, step, design=design)
+            _require_obstacles_at(scene, wanted.time)
+            previous.check(scene)
+        scene = previous.kept(scene)
+        equilibria = self._equilibria(scene, sensitivity=design or adjoint)
         _dolfinx.warn_if_untested(self.comm.rank)  # once PETSc has started on the ranks that solve
-        first = (self.state if start == "last" else start) or (last if last is before else None)
+        first = self.state if start == "last" else start
+        linear = not scene.is_nonlinear
         with one_thread(self.comm):
-            if kind is SolverKind.TANGENT_NEWTON:
-                self._require_no_dual_solver()
-                with together(self.comm):
-                    near = None if refinements is None else checked_start(scene, first, refinements)
-                state: AnyState = self._deformed(scene).solve(
-                    scene, before, wanted, time, step, overlap=design or refinements is not None, start=near
-                )
-            else:
-                check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
-                with together(self.comm):
-                    guess = checked_start(scene, first, refinements)
-                known = self._alike(scene, first if guess is first else None)
-                state = self._linear(scene).solve(
-                    scene, kind, wanted, start=guess, before=before, known=known, design=design
-                )
+            if linear:
+                check_same_input(self.comm, scene, solver=self.solver, tolerance=accuracy)
+            with together(self.comm):
+                if linear or refinements is not None:
+                    previous = previous.starting(scene, first, refinements)
+            state = equilibria.solve(scene, previous.reusing(scene, self.state), wanted)
         self.state = state
         with self.timer.phase("state"):
             self._warnings.warn(state, design=design)
@@ -553,15 +276,23 @@ class ContactProblem:
         with together(self.comm):
             return choose_solver(scene, count, sensitivity=sensitivity)
 
+    def _equilibria(self, scene: Scene, *, sensitivity: bool) -> Equilibria:
+        """Return what finds the equilibrium of a scene. Collective."""
+        kind = self._kind(scene, sensitivity=sensitivity)
+        if kind is SolverKind.TANGENT_NEWTON:
+            self._require_no_dual_solver()
+            return self._deformed(scene)
+        if kind is SolverKind.DIRECT and self.solver is None:
+            return DirectEquilibria(self._decomposed(scene), self.timer)
+        solver = self.solver or default_solver(kind)
+        return LinearEquilibria(self._decomposed(scene), solver, self.timer, balances=self.solver is None)
+
     def _require_no_dual_solver(self) -> None:
         if self.solver is not None:
             raise InvalidInputError(
                 f"dual solvers are for linear materials, this scene has others, got {self.solver!r}: "
                 "give steps=AutomaticSteps(TangentNewton(...)) instead"
             )
-
-    def _linear(self, scene: Scene) -> LinearEquilibria:
-        return LinearEquilibria(self._decomposed(scene), self.solver, self.timer)
 
     def _deformed(self, scene: Scene) -> DeformedEquilibria:
         """Return what finds equilibria of nonlinear materials. Collective on first use."""
@@ -593,15 +324,7 @@ class ContactProblem:
         scene = self.scene if scene is None else scene
         if "lengths" in stored:
             scene = replace(scene, preloads=held_at(scene, stored["lengths"]))
-        if self._kind(scene, sensitivity=False) is SolverKind.TANGENT_NEWTON:
-            return self._deformed(scene).restored(stored, scene)
-        return self._linear(scene).restored(stored, scene, self.state)
-
-    def _alike(self, scene: Scene, start: State | None) -> State | None:
-        """Return the state to reuse: the last one if it has the scene's meshes, else the start."""
-        if start is None or self.state is None:
-            return start
-        return self.state if scene.has_meshes_of(self.state.scene) else start
+        return self._equilibria(scene, sensitivity=False).restored(stored, scene, self.state)
 
 
 def _require_scene(scene: object) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 import numpy as np
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from fenics_contact._equilibrium.problem import default_solver
+from fenics_contact._equilibrium.linear import default_solver
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.plan import choose_solver
 from fenics_contact._scene.preloads import Preload

@@ -157,7 +157,7 @@ def test_a_stored_state_keeps_its_fluid() -> None:
     scene = seal(FluidPressure(2.0, "x0"), extra=0.5)
     problem = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9)
     state = problem.solve()
-    found = problem._linear(scene).restored(stored_state(state), scene, None)
+    found = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9).restore(stored_state(state))
     np.testing.assert_array_equal(found.contact.wet, state.contact.wet)
     np.testing.assert_allclose(found.contact.normal_force, state.contact.normal_force, atol=1e-9)
     assert found.solution.residuals.within(1e-8)  # type: ignore[union-attr]

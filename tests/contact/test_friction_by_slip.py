@@ -97,7 +97,7 @@ def test_a_stored_state_keeps_its_coefficients() -> None:
     scene = dragged_block(Coulomb(SlipTable((0.0, 0.004), (0.4, 0.3))), 6.0, shift=0.005)
     problem = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9)
     state = problem.solve()
-    found = problem._linear(scene).restored(stored_state(state), scene, None)
+    found = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9).restore(stored_state(state))
     np.testing.assert_allclose(found.contact.slip_bound, state.contact.slip_bound, rtol=1e-9)
     assert found.solution.residuals.within(1e-7)  # type: ignore[union-attr]
 

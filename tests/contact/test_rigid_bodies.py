@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact._equilibrium.problem import default_solver
+from fenics_contact._equilibrium.linear import default_solver
 from fenics_contact._scene.plan import SolverKind
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import DualProblem, FaceNewton, InTurn, solve

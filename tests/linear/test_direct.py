@@ -13,7 +13,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Body, RigidSurface, Scene, State, Support, Traction, box_partition, solve_scene
-from fenics_contact._equilibrium.problem import default_solver
+from fenics_contact._equilibrium.linear import default_solver
 from fenics_contact._scene.loads import Load
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.feti.direct import DirectSystem

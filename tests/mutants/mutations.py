@@ -235,9 +235,9 @@ MUTATIONS = (
     ),
     Mutation(
         "load steps forget the slip before",
-        "_equilibrium/problem.py",
-        "if before is not None:",
-        "if before is None:",
+        "_equilibrium/previous.py",
+        "return torn if self.before is None else",
+        "return torn if self.before is not None else",
         ("tests/contact/test_steps.py::test_unloading_does_not_return_to_the_start",),
     ),
     Mutation(
