@@ -11,6 +11,7 @@ from benchmarks.decks.calculix import Block
 from fenics_contact._scene.loads import PointForce, ThermalStrain
 from fenics_contact._scene.supports import Support
 from fenics_contact.decks import Deck
+from fenics_contact.feti.constraints import ConstraintRows
 from fenics_contact.mesh.cell_types import CELL_TYPES, shape_values
 from fenics_contact.mesh.quality import jacobians
 from fenics_contact.results.state import State
@@ -93,8 +94,8 @@ def _held(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
         number = tearing.body_names.index(body)
         part = slice(int(tearing.node_offset[number]), int(tearing.node_offset[number + 1]))
         own = forces.reaction[part] + (0.0 if heated else forces.load[part])
-        if forces.constraint is not None:
-            own = own + forces.constraint[part]
+        for equations in state.torn.groups.of(ConstraintRows):
+            own = own + equations.on_nodes(forces.joints[equations])[part]
         for load in scene.loads if heated else ():
             if isinstance(load, PointForce) and load.body == body:
                 nodes = scene.bodies[body].mesh.nodes_of(load.nodes)
@@ -118,7 +119,7 @@ def _held(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
 
 def _largest_force(deck: Deck, state: State) -> float:
     forces = state._nodal_forces
-    every = forces.load, forces.reaction, forces.contact, forces.tie
+    every = forces.load, forces.reaction, forces.contact, *forces.joints.values()
     return deck.thickness * max(float(np.abs(each).max(initial=0.0)) for each in every)
 
 

@@ -40,7 +40,7 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     flexibility = system.problem.diagonal[layout.tangential].mean(axis=1)
     squares = global_sum(system.problem.comm, flexibility @ change**2, flexibility @ raised**2)
     by_law, by_limit = (float(part) for part in np.sqrt(squares))
-    largest = float(torn.friction_coefficient.max(initial=0.0))
+    largest = float(torn.groups.slips.coefficient.max(initial=0.0))
     return min(by_law, largest * certificate.bound) + by_limit
 
 
@@ -148,7 +148,7 @@ def solver_errors(system: DualSystem | DirectSystem, solution: DualSolution | Di
         return SolverErrors(direct_error(system, solution), 0.0)
     assert isinstance(solution, DualSolution)
     certificate = certify(system, solution)
-    own_bounds = bool(np.any(system.torn.friction_coefficient > 0.0))
+    own_bounds = bool(np.any(system.torn.groups.slips.coefficient > 0.0))
     return SolverErrors(certificate.bound, friction_error(system, solution, certificate), own_bounds)
 
 

@@ -96,7 +96,7 @@ class SupportForce(Weighable):
         normal = -np.einsum("nd,nd->n", torn.points.normal, torn.points.relative(held))
         tangential = np.einsum("nad,nd->na", torn.points.tangents, torn.points.relative(held))
         by_multiplier = on_rows(state, normal, tangential) - torn.jump(at_copies(torn.decomposition, held))
-        return Partials.of(state, value, by_multiplier=by_multiplier + _of_ties(torn, held))
+        return Partials.of(state, value, by_multiplier=by_multiplier + _of_joints(torn, held))
 
     def _numbers(self, state: State) -> list[int]:
         scene = state.scene
@@ -130,19 +130,13 @@ class SupportForce(Weighable):
         return np.asarray(total - free_part(total, every, decomposition.fixed, decomposition.axes))
 
 
-def _of_ties(torn: TornSystem, held: np.ndarray) -> np.ndarray:
-    """Return the derivative by the multipliers of ties of what these exert on held nodes, owned."""
-    result, rows = np.zeros(len(torn.numbering.owned)), torn.relations[0]
-    if rows.count:
-        work = np.einsum("rd,rd->r", rows.directions, torn.ties.relative(held)[rows.which])
-        position = torn.numbering.owned_index(torn.n_gluing + np.arange(rows.count))
-        acting = np.where(rows.held(torn.decomposition.fixed), 0.0, work)
-        result[position[position >= 0]] = acting[position >= 0]
-    if torn.constraints is not None:
-        work = torn.constraints.whole @ held.ravel()
-        position = torn.numbering.owned_index(torn.after_ties + np.arange(len(work)))
-        result[position[position >= 0]] = work[position >= 0]
-    return result
+def _of_joints(torn: TornSystem, held: np.ndarray) -> np.ndarray:
+    """Return the derivative by the multipliers of joints of what these exert on held nodes, owned."""
+    result = np.zeros(torn.groups.total)
+    for joint in torn.groups.joints:
+        acting = np.where(joint.held(torn.decomposition.fixed), 0.0, joint.measured(held))
+        result[torn.groups.rows_of(joint)] = acting
+    return result[torn.numbering.owned]
 
 
 def _require_fixed_shape(objective: object, forms: ShapeForms) -> None:

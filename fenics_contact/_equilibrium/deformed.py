@@ -39,7 +39,6 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInpu
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import nodal_mean_transposed, nodal_sum
 from fenics_contact.feti.decomposition import Decomposition
-from fenics_contact.feti.preloads import shortening_columns, shortening_scales
 from fenics_contact.feti.torn import TornSystem, contacts_alike
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.qp.reductions import global_sum
@@ -48,7 +47,7 @@ from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.deformed_state import DeformedState, row_values_at
 from fenics_contact.results.dual_solve import contact_result
 from fenics_contact.results.rigid_motions import UnheldMotion
-from fenics_contact.results.state import Energies, State, softened
+from fenics_contact.results.state import Energies, State
 
 if TYPE_CHECKING:
     from fenics_contact._pairing.sliding.slip import MaterialPoints
@@ -136,8 +135,8 @@ class DeformedEquilibria:
             overlap = wanted.design or previous.is_coarser
             load = self._loading(scene, wanted.time, step, overlap)
             if isinstance(before, DeformedState) and acted is not None:
-                if scene.preloads:
-                    acted = drawn_as(before, acted, load)
+                if any(joint.draws for joint in load.torn.groups.joints):
+                    acted = begun_as(before, acted, load)
                 acted, load = moved_as(begin, acted, load, equations.contact)
             if acted is None:
                 check_held(load.torn)
@@ -307,24 +306,23 @@ def _balanced(evaluation: ResidualState) -> Configuration:
     return replace(at, multiplier=at.multiplier + torn.gluing_of(evaluation.unbalanced))
 
 
-def drawn_as(before: DeformedState, acted: Loading, load: Loading) -> Loading:
-    """Return the load of the state before with the sections free that are now. Collective.
+def begun_as(before: DeformedState, acted: Loading, load: Loading) -> Loading:
+    """Return the load of the state before with the unknowns of joints that are now, see `Joint.begun`.
 
-    Those that were held have the force that they transmitted, those that were free are held where they were.
+    Collective.
     """
-    now, torn, sections = load.torn, acted.torn, list(before.preloads().values())
-    drawn = shortening_columns(now.scene, now.relations[0])
-    scales = shortening_scales(now.scene)
-    free = [number for number, preload in enumerate(now.scene.preloads) if preload.is_free]
-    forces = np.array([sections[number].force / scales[number] for number in free])
-    lengths = np.array([0.0 if n in free else section.shortening for n, section in enumerate(sections)])
-    owned = torn.numbering.owned
-    right = np.zeros(torn.numbering.total)
-    right[torn.n_gluing : torn.n_gluing + drawn.shape[0]] = drawn @ lengths
-    at_sections = np.zeros(torn.numbering.total, dtype=bool)
-    at_sections[torn.n_gluing : torn.n_gluing + drawn.shape[0]] = np.diff(drawn.indptr) > 0
-    kept = np.where(at_sections[owned], right[owned], torn.right)
-    return replace(acted, torn=replace(torn, right=kept, free=replace(now.free, load=forces)))
+    now, torn, was = load.torn, acted.torn, before.torn
+    jump = was.jump(before.torn_displacement)
+    right, loads = np.full(torn.groups.total, np.nan), []
+    for joint in torn.groups.joints:
+        for earlier in was.groups.of(type(joint)):
+            values = (was.gathered(each, earlier) for each in (jump, before.solution.multiplier))
+            right[torn.groups.rows_of(joint)], forces = joint.begun(earlier, now.scene, *values)
+            loads.append(forces)
+    right = right[torn.numbering.owned]
+    kept = np.where(np.isnan(right), torn.right, right)
+    free = replace(now.free, load=np.concatenate(loads))
+    return replace(acted, torn=replace(torn, right=kept, free=free))
 
 
 def moved_as(at: Configuration, acted: Loading, load: Loading, contact: Contact) -> tuple[Loading, Loading]:
@@ -436,10 +434,8 @@ def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
     turned = evaluation.load.turned
     strain += sum(0.5 * float(each.springs @ each.motion**2) for each in turned)
     work += sum(each.work for each in turned if each.free.any())
-    surface = 0.0
-    if evaluation.torn.compliance is not None or evaluation.torn.give is not None:
-        given_way, kept = softened(evaluation.torn, evaluation.at.multiplier)
-        surface = float(evaluation.torn.numbering.comm.allreduce(given_way - kept))
+    given_way, kept = evaluation.torn.compliance.energies(evaluation.at.multiplier)
+    surface = float(evaluation.torn.numbering.comm.allreduce(given_way - kept))
     return Energies(strain, work, rubbed + evaluation.rubbing, surface=surface)
 
 

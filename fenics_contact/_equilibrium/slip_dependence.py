@@ -17,7 +17,7 @@ from fenics_contact.results.state import State
 
 def coefficients(torn: TornSystem, slip: np.ndarray) -> np.ndarray:
     """Return μ of the frictional points at slips of all points, shape (n, dim − 1); others keep theirs."""
-    result, way = torn.friction_coefficient.copy(), np.linalg.norm(slip, axis=1)[torn.frictional]
+    result, way = torn.groups.slips.coefficient.copy(), np.linalg.norm(slip, axis=1)[torn.frictional]
     pairs = torn.points.pair[torn.frictional]
     for number, pair in enumerate(torn.scene.contacts):
         if pair.slip_table is not None:
@@ -27,10 +27,8 @@ def coefficients(torn: TornSystem, slip: np.ndarray) -> np.ndarray:
 
 def with_coefficients(torn: TornSystem, coefficient: np.ndarray) -> TornSystem:
     """Return a system with other friction coefficients of its frictional points."""
-    strengths = torn.strengths
-    if strengths is not None:
-        strengths = replace(strengths, coefficient=coefficient)
-    return replace(torn, friction_coefficient=coefficient, strengths=strengths)
+    groups = torn.groups
+    return replace(torn, groups=replace(groups, slips=groups.slips.with_coefficient(coefficient)))
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import at_copies
 from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.ties import same_points
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, shape_values
@@ -88,7 +89,7 @@ def carried_over(before: TornSystem, multiplier: np.ndarray, after: TornSystem) 
     tau = before.numbering.gather(multiplier, before.tangential_rows.ravel()).reshape(
         -1, before.components - 1
     )
-    match = _matches(_renumbered(before, after), after.points)
+    match = same_points(_renumbered(before, after), after.points)
     matched = match >= 0
     values = np.zeros(after.points.count)
     values[matched] = normal[match[matched]]
@@ -108,13 +109,10 @@ def _held_otherwise(before: TornSystem, multiplier: np.ndarray, after: TornSyste
     """
     held = before.numbering.owned < before.n_gluing
     start = after.gluing_of(before.force(np.where(held, multiplier, 0.0)))
-    old, new = before.relations[0], after.relations[0]
-    forces = np.zeros((before.ties.count, before.components))
-    along = before.numbering.gather(multiplier, np.arange(before.n_gluing, before.n_equality))
-    np.add.at(forces, old.which, along[:, None] * old.directions)
-    match = _matches(before.ties, after.ties)[new.which]
-    kept = np.where(match >= 0, np.einsum("rd,rd->r", forces[match], new.directions), 0.0)
-    _put(after, start, np.arange(after.n_gluing, after.n_equality), kept)
+    for joint in after.groups.joints:
+        for earlier in before.groups.of(type(joint)):
+            kept = joint.carried(earlier, before.gathered(multiplier, earlier))
+            _put(after, start, after.groups.rows_of(joint), kept)
     return start
 
 
@@ -139,17 +137,6 @@ def solve_from_coarse(
     return replace(found, products=found.products + spent, history=steps, iterations=len(steps))
 
 
-def _matches(before: ContactPoints, after: ContactPoints) -> np.ndarray:
-    """Return for each new point the old one of the same pair and slave node, −1 where there is none."""
-    if before.count == 0:
-        return np.full(after.count, -1)
-    width = int(max(before.slave.max(), after.slave.max(initial=0))) + 1
-    old, new = before.pair * width + before.slave, after.pair * width + after.slave
-    order = np.argsort(old)
-    index = np.minimum(np.searchsorted(old[order], new), before.count - 1)
-    return np.where(old[order[index]] == new, order[index], -1)
-
-
 def _renumbered(before: TornSystem, after: TornSystem) -> ContactPoints:
     """Return the contact points of a system, numbered as those of another one that may have other pairs."""
     old, new = ([(pair.slave, pair.master) for pair in each.scene.contacts] for each in (before, after))
@@ -169,7 +156,7 @@ def put_contact(torn: TornSystem, vector: np.ndarray, normal: np.ndarray, fricti
     if len(torn.frictional):
         turned = np.einsum("nad,nd->na", torn.points.tangents[torn.frictional], friction[torn.frictional])
         # Along tangents that supports hold at rest friction is rounding, which would turn slipping discs.
-        slips = torn.relations[2]
+        slips = torn.groups.slips
         still = slips.held(torn.decomposition.fixed) & slips.resting
         turned[still.reshape(turned.shape)] = 0.0
         _put(torn, vector, torn.tangential_rows.ravel(), turned.ravel())
@@ -227,10 +214,10 @@ class CoarseStart:
         torn, problem = system.torn, system.problem
         moved, start = self.displacement(torn), self.at_contact(torn)
         glued = torn.numbering.owned < torn.n_equality
-        if torn.give is not None:
-            soft = torn.give > 0.0
-            glued &= ~soft
-            start[soft] = -torn.closed(torn.right - torn.jump(moved))[soft] / torn.give[soft]
+        if torn.groups.compliance.any():
+            soft = torn.compliance.soft
+            glued[soft] = False
+            start[soft] = -torn.closed(torn.right - torn.jump(moved))[soft] / torn.compliance.constant
         # In equilibrium, K⁺ yields a displacement whose forces S u are those of loads and multipliers.
         left = problem.coarse.load - problem.coarse.apply(start)
         balanced = start + problem.coarse.with_load(left).particular()

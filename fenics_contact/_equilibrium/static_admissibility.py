@@ -10,7 +10,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact._pairing.points import ContactPoints, are_sliding
+from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
@@ -19,6 +19,7 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.foundations import foundation_stiffness, separated
+from fenics_contact.feti.row_groups import Joint
 from fenics_contact.feti.subdomain import kernel_of_body
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.cuts import parts_of
@@ -60,10 +61,10 @@ def _check_balance(
     if scale == 0.0:
         return
     support = sp.block_diag([body.support for body in bodies])
-    tied, along = _of_ties(torn, bodies)
+    tied = _of_joints(torn, bodies)
     reactions, right = sp.hstack([support, tied]), -loads.ravel() / scale
     contact = sp.vstack([body.contact_wrenches(torn) for body in bodies])
-    bound = np.minimum(torn.tresca_bound / scale, largest)
+    bound = np.minimum(torn.groups.slips.tresca_bound / scale, largest)
     balance = _Balance(torn, reactions, contact, right, bound)
     left = balance.left(1.0 - MARGIN)
     if left is None:
@@ -76,8 +77,7 @@ def _check_balance(
     # The certificate points against the right side, which is minus the load. The pushed body may take others
     # along: it is the one on which the load does most work.
     pushed = int(np.argmax(np.einsum("bm,bm->b", found.bodies, loads)))
-    if along is not None:
-        _require_closed(torn, bodies, found, along)
+    _require_closed(torn, bodies, found)
     if without_margin is None:
         raise InfeasibleError(
             f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} is "
@@ -99,31 +99,25 @@ def _tipping(balance: _Balance, bodies: list[RigidBody]) -> _Motion | None:
     return None if left is None else _Motion.of(sticking, 1.0, left, bodies)
 
 
-def _require_closed(torn: TornSystem, bodies: list[RigidBody], found: _Motion, along: sp.csr_matrix) -> None:
-    """Reject preloads that draw parts together between which nothing resists."""
-    wrenches = [body.tie_wrenches(torn) @ along for body in bodies]
-    moved = sum(wrench.T @ own for wrench, own in zip(wrenches, found.bodies, strict=True))
-    free = [preload for preload in torn.scene.preloads if preload.is_free]
-    for preload, way in zip(free, np.abs(np.atleast_1d(moved)), strict=True):
-        if preload.force and way > MARGIN * np.abs(found.bodies).max():
-            raise InfeasibleError(
-                f"a preload must draw parts against each other, but that of body {preload.body!r} acts "
-                f"against an open joint: nothing resists its force of {preload.force:g} between the parts on "
-                "both sides of its section. Let head and nut, and what they clamp, have contacts or ties, or "
-                "give a shortening in place of the force"
-            )
+def _require_closed(torn: TornSystem, bodies: list[RigidBody], found: _Motion) -> None:
+    """Reject forces that draw parts together between which nothing resists."""
+    least = MARGIN * np.abs(found.bodies).max()
+    for joint in torn.groups.joints:
+        along, _ = joint.released(torn.scene)
+        if along.shape[1]:
+            wrenches = [body.joint_wrenches(joint) @ along for body in bodies]
+            moved = sum(wrench.T @ own for wrench, own in zip(wrenches, found.bodies, strict=True))
+            joint.require_resisted(torn.scene, np.atleast_1d(moved), least)
 
 
-def _of_ties(torn: TornSystem, bodies: list[RigidBody]) -> tuple[sp.csr_matrix, sp.csr_matrix | None]:
-    """Return the wrenches of ties, and the directions in which forces draw sections; None without any.
-
-    Sections that forces draw together transmit nothing else along their normals.
-    """
-    tied = sp.vstack([body.tie_wrenches(torn) for body in bodies])
-    if not any(preload.is_free for preload in torn.scene.preloads):
-        return tied, None
-    along, _ = _along_sections(torn)
-    return tied - (tied @ along) @ along.T, along
+def _of_joints(torn: TornSystem, bodies: list[RigidBody]) -> sp.csr_matrix:
+    """Return the wrenches of joints on all bodies, but along those forces of theirs that are known."""
+    parts = [sp.csr_matrix((sum(body.motions for body in bodies), 0))]
+    for joint in torn.groups.joints:
+        wrenches = sp.csr_matrix(np.vstack([body.joint_wrenches(joint) for body in bodies]))
+        along, _ = joint.released(torn.scene)
+        parts.append(wrenches - (wrenches @ along) @ along.T if along.shape[1] else wrenches)
+    return sp.hstack(parts, format="csr")
 
 
 def rigid_bodies(torn: TornSystem, *, sprung: bool = True) -> list[RigidBody]:
@@ -140,30 +134,6 @@ def rigid_bodies(torn: TornSystem, *, sprung: bool = True) -> list[RigidBody]:
         marks = (part == number for number in range(part.max() + 1))
         found += [RigidBody(torn, index, mark, sprung=sprung) for mark in marks]
     return found
-
-
-def _along_sections(torn: TornSystem) -> tuple[sp.csr_matrix, np.ndarray]:
-    """Return directions in which forces draw sections together, among forces at tied points, and the forces.
-
-    Returns shape (n_tie_forces, n_free), orthonormal, and coefficients of these, (n_free,).
-    """
-    scene, ties = torn.scene, torn.ties
-    bonded = ~are_sliding(scene.ties, ties.pair[: ties.count - len(scene.springs)])
-    place = np.cumsum(bonded) - 1
-    sprung = 0 if torn.springs is None else torn.springs.count
-    constrained = 0 if torn.constraints is None else torn.constraints.count
-    columns, forces = [], []
-    for number, preload in enumerate(scene.preloads):
-        if not preload.is_free:
-            continue
-        mine = np.flatnonzero(ties.pair == len(scene.ties) + number)
-        row = place[mine][:, None] * torn.components + np.arange(torn.components)
-        size = np.sqrt(len(mine))
-        entries = (ties.normal[mine].ravel() / size, (row.ravel(), np.zeros(row.size, dtype=np.int64)))
-        count = torn.components * int(bonded.sum()) + int((~bonded).sum()) + sprung + constrained
-        columns.append(sp.csr_matrix(entries, shape=(count, 1)))
-        forces.append(-(preload.force or 0.0) / size)
-    return sp.hstack(columns, format="csr"), np.array(forces)
 
 
 class RigidBody:
@@ -206,21 +176,14 @@ class RigidBody:
         slip = -np.einsum("nad,ndm->mna", points.tangents[torn.frictional], arms[torn.frictional])
         return sp.csr_matrix(np.hstack([normal, slip.reshape(len(normal), -1)]))
 
-    def tie_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
-        """Wrenches of unit forces at tied points, then of springs and constraints, shape (n_modes, n)."""
-        count = torn.ties.count - len(torn.scene.springs)
-        arms, sprung = np.split(self.arms(torn.ties), [count])
-        sliding = are_sliding(torn.scene.ties, torn.ties.pair[:count])
-        bonded = arms[~sliding].reshape(-1, arms.shape[2]).T
-        gliding = np.einsum("nd,ndm->mn", torn.ties.normal[:count][sliding], arms[sliding])
-        every = [bonded, gliding]
-        if torn.springs is not None:
-            every.append(np.einsum("rd,rdm->mr", torn.springs.directions, sprung[torn.springs.spring]))
-        if torn.constraints is not None:
-            own = slice(self._nodes.start * torn.components, self._nodes.stop * torn.components)
-            modes = self._modes.reshape(-1, self._modes.shape[2])
-            every.append(np.asarray(torn.constraints.whole[:, own] @ modes).T)
-        return sp.csr_matrix(np.hstack(every))
+    def joint_wrenches(self, joint: Joint) -> np.ndarray:
+        """Wrenches of unit forces of a joint, shape (n_modes, n)."""
+        return joint.wrenches(self._modes, self._nodes)
+
+    @property
+    def motions(self) -> int:
+        """Number of rigid motions."""
+        return int(self._modes.shape[2])
 
     def load_wrench(self, torn: TornSystem) -> np.ndarray:
         """Wrench of the loads on this rank's part of the body, shape (n_modes,)."""
@@ -231,9 +194,10 @@ class RigidBody:
                 wrench += subdomain.load @ self._modes[subdomain.mesh.nodes].reshape(-1, count)
         if torn.decomposition.comm.rank == 0:
             wrench += point_loads(torn.scene, self.name, self._modes)
-            if any(preload.is_free for preload in torn.scene.preloads):
-                along, forces = _along_sections(torn)
-                wrench += self.tie_wrenches(torn) @ (along @ forces)
+            for joint in torn.groups.joints:
+                along, forces = joint.released(torn.scene)
+                if len(forces):
+                    wrench += self.joint_wrenches(joint) @ (along @ forces)
         return wrench
 
     def arms(self, points: ContactPoints) -> np.ndarray:
@@ -317,7 +281,7 @@ class _Balance:
         # Unknowns: x, the distance t and the remainder y; ‖y‖ ≤ t.
         size, left = forces.size, np.arange(len(right))
         cost = small * forces
-        cost[self.support.shape[1] + torn.frictional] += part * torn.friction_coefficient * speed
+        cost[self.support.shape[1] + torn.frictional] += part * torn.groups.slips.coefficient * speed
         balance = sp.hstack(
             [self.support, self.contact, sp.csr_matrix((len(left), 1)), sp.identity(len(left))]
         )
@@ -439,11 +403,11 @@ def _admissible(
 
     part, tresca_bound = friction
     # Surfaces that supports hold apart cannot be pressed together, whatever the supports could carry.
-    pressed = ~torn.relations[1].held(torn.decomposition.fixed)[torn.frictional]
-    coefficient = part * pressed * torn.friction_coefficient
+    pressed = ~torn.groups.normal.held(torn.decomposition.fixed)[torn.frictional]
+    coefficient = part * pressed * torn.groups.slips.coefficient
     n_normal, discs, width = torn.points.count, len(torn.frictional), torn.components
     size = reactions + n_normal + (width - 1) * discs
-    coulomb = torn.tresca_bound == 0.0
+    coulomb = torn.groups.slips.tresca_bound == 0.0
     # Rows −(Ψ, τ) of each disc, with Ψ = μ λ_N or a given bound.
     disc = width * np.arange(discs)
     tau = reactions + n_normal + np.arange((width - 1) * discs).reshape(-1, width - 1)
@@ -527,7 +491,7 @@ def _unresisted(torn: TornSystem, sprung: bool) -> tuple[UnheldMotion, ...]:
     if all(body.held for body in bodies):
         return ()
     supports = sp.block_diag([body.support for body in bodies])
-    ties, _ = _of_ties(torn, bodies)
+    ties = _of_joints(torn, bodies)
     wrenches = sp.hstack([supports, ties, *_of_contact(torn, bodies)], format="csc")
     basis, resistance = np.zeros((wrenches.shape[0], 0)), np.zeros(0)
     for start in range(0, wrenches.shape[1], CHUNK):  # each is on two bodies at most, so all are many zeros

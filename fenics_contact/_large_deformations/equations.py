@@ -181,10 +181,9 @@ class ResidualState:
         _, friction = self.contact.at_points(self.at.multiplier)
         _, against = self.contact.at_points(self.constraint_residual)
         work = -float(np.sum(friction * against))
-        if self.torn.elastic_slip is not None:
-            squares = np.sum(friction[self.torn.frictional] ** 2, axis=1)
-            work -= float(self.torn.elastic_slip @ squares)
-        return work
+        slips = self.torn.groups.slips
+        squares = np.sum(friction[slips.frictional] ** 2, axis=1)
+        return work - float(slips.elastic_slip @ squares)
 
     @property
     def torn(self) -> TornSystem:
@@ -426,10 +425,9 @@ class Equations:
         unbalanced = beyond(external - internal - bound, ROUNDED * self.stiffness * self._cell)
         least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
         open_ = contact.constraint_residual(at.displacement)
-        if torn.give is not None:
-            open_ = open_ + torn.give * at.multiplier
+        open_ = torn.compliance.added(open_, at.multiplier)
         step, feasible = at.natural_step(caution), torn.law.feasible(at.multiplier)
-        trial, compliance = at.multiplier - step * open_, torn.compliance
+        trial, compliance = at.multiplier - step * open_, torn.compliance.contact
         mapped = feasible.project(trial) if compliance is None else compliance.resolve(feasible, trial, step)
         natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
         forces = self._with_free(torn, unbalanced, at.multiplier), internal, bound, external

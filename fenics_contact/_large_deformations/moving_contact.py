@@ -15,7 +15,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
 from fenics_contact._large_deformations.loading import Loading
 from fenics_contact._pairing.inside import InFacets
-from fenics_contact._scene.local_axes import free_matrix
+from fenics_contact._scene.local_axes import LocalAxes, free_matrix
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane, RigidTool
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
@@ -24,8 +24,9 @@ from fenics_contact._surfaces.facets import share_areas
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.contact_rows import on_copies
-from fenics_contact.feti.decomposition import Decomposition
-from fenics_contact.feti.torn import TornSystem, meeting_at
+from fenics_contact.feti.decomposition import Decomposition, Rows, Tearing
+from fenics_contact.feti.row_groups import RowGroup
+from fenics_contact.feti.torn import TornSystem, on_contact_rows
 from fenics_contact.qp.reductions import Vector
 
 if TYPE_CHECKING:
@@ -236,7 +237,7 @@ class FurtherRows:
         place, ends = begin + np.arange(len(number)), normal + pairs * np.arange(3)
         forces, displacements = ((number >= first) & (number < last) for first, last in pairwise(ends))
         correcting = number >= ends[-1]
-        row = before.n_equality + turning.corrected[number[correcting] - ends[-1]]
+        row = before.groups.n_equality + turning.corrected[number[correcting] - ends[-1]]
         return cls(
             compliance[number],
             place[forces],
@@ -260,6 +261,40 @@ class FurtherRows:
             share=np.asarray(self.share * s[self.displacement_rows] * s[self.force_rows]),
             correction=np.asarray(self.correction * s[self.corrected_rows] / s[self.correction_rows]),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class TurningRows(RowGroup):
+    """Rows of turning forces on the free components of nodes.
+
+    Attributes:
+        fields: Displacements of nodes that the rows measure, shape (n_dofs, n_rows); dof dim · node +
+            component of all nodes.
+        owner: Node whose rank owns each row, shape (n_rows,).
+        axes: Axes of nodes along which supports prescribe components; None: the coordinates' everywhere.
+    """
+
+    fields: sp.csr_matrix
+    owner: np.ndarray
+    axes: LocalAxes | None
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return len(self.owner)
+
+    def rows(self, tearing: Tearing, fixed: np.ndarray) -> Rows:
+        """Return these rows of B."""
+        fields, axes = self.fields, self.axes
+        entries = (fields if axes is None else free_matrix(fixed, axes) @ fields).T.tocoo()
+        node, component = np.divmod(entries.col, tearing.components)
+        free = ~fixed[node, component] if axes is None else np.full(len(node), True)
+        row, value = entries.row[free], entries.data[free]
+        return on_copies(tearing, row, node[free], component[free], value, self.owner)
+
+    def columns(self, fields: sp.csr_matrix) -> sp.csr_matrix:
+        """Return by how much fields of nodes, (n_dofs, n), close the rows, shape (n_rows, n)."""
+        return -self.fields.T @ fields
 
 
 NO_ROWS = FurtherRows(np.zeros(0), _NONE, _NONE, np.zeros(0), _NONE, _NONE, np.zeros(0))
@@ -315,15 +350,14 @@ class ContactConfiguration:
         if self.points is None:
             return self
         elastic = None
-        if self.torn.elastic_slip is not None:
+        if self.torn.groups.slips.is_elastic:
             elastic = self.elastic_slip(self.at_points(multiplier)[1])
         return replace(self, start=self.points.material_points(elastic))
 
     def elastic_slip(self, friction: np.ndarray) -> np.ndarray:
         """Return D τ of friction forces, both of shape (n, dim − 1), [length]."""
-        by_force, torn = np.zeros(len(friction)), self.torn
-        if torn.elastic_slip is not None:
-            by_force[torn.frictional] = torn.elastic_slip
+        by_force, slips = np.zeros(len(friction)), self.torn.groups.slips
+        by_force[slips.frictional] = slips.elastic_slip
         return np.asarray(by_force[:, None] * friction)
 
     def constraint_residual(self, displacement: Vector) -> Vector:
@@ -355,7 +389,7 @@ class ContactConfiguration:
             across |= np.max(along**2, axis=2) > 0.5
         held = np.zeros_like(across)
         held[torn.frictional] = (
-            torn.relations[2].held(torn.decomposition.fixed).reshape(-1, torn.components - 1)
+            torn.groups.slips.held(torn.decomposition.fixed).reshape(-1, torn.components - 1)
         )
         return np.asarray(across & held)
 
@@ -367,7 +401,7 @@ class ContactConfiguration:
         normal, friction = self.at_points(multiplier)
         points, slave, normal = self.points, self.points.points.slave, np.maximum(normal, 0.0)
         stiffness, torn = points.stiffness(normal), self.torn
-        apart = torn.closures is not None or torn.elastic_slip is not None
+        apart = torn.compliance.contact is not None
         means = points.mean_tangents(normal, friction, self.start, apart=apart)
         further += [
             UnevenStiffness(each.left, each.right, slave[each.point])
@@ -434,18 +468,8 @@ class ContactConfiguration:
         """Return the system with the rows of turning forces after all others, in lengths. Collective."""
         decomposition = self.torn.decomposition
         points = self.torn.points if self.points is None else self.points.points
-        further = []
-        fixed, axes = decomposition.fixed, decomposition.axes
-        for columns, owner in turning.columns:
-            entries = (columns if axes is None else free_matrix(fixed, axes) @ columns).T.tocoo()
-            node, component = np.divmod(entries.col, self.torn.components)
-            free = ~fixed[node, component] if axes is None else np.full(len(node), True)
-            rows = on_copies(
-                decomposition.tearing, entries.row[free], node[free], component[free], entries.data[free],
-                owner,
-            )  # fmt: skip
-            further.append((rows, columns))
-        return meeting_at(self.torn, points, self.prescribed, further)
+        rows = (TurningRows(*each, decomposition.axes) for each in turning.columns)
+        return on_contact_rows(self.torn, points, self.prescribed, tuple(rows))
 
 
 class Contact:
@@ -531,7 +555,7 @@ class MovingContact(Contact):
         found = self._sliding.at(coordinates, known, load.time, start, load.loose)
         here = found.material_points()
         start = here if start is None else start.extended(here)
-        torn = meeting_at(load.torn, found.points, load.prescribed)
+        torn = on_contact_rows(load.torn, found.points, load.prescribed)
         return ContactConfiguration(torn, found, start, load.prescribed)
 
     def found_again(
@@ -540,7 +564,7 @@ class MovingContact(Contact):
         """Return the points that were stored by `SlidingPoints.stored`. Collective."""
         coordinates = self._coordinates(load, displacement)
         found, start = self._sliding.found_again(stored, coordinates, load.time, load.loose)
-        torn = meeting_at(load.torn, found.points, load.prescribed)
+        torn = on_contact_rows(load.torn, found.points, load.prescribed)
         return ContactConfiguration(torn, found, start, load.prescribed)
 
     def _coordinates(self, load: Loading, displacement: Vector) -> np.ndarray:

@@ -277,7 +277,7 @@ def tracked_motions(turned: Sequence[TurnedSurface], torn: TornSystem) -> FreeMo
 
     Behind their columns on nodes are those of u = e_b r_a, whose work gives the dyads Σ r Fᵀ.
     """
-    decomposition, size = torn.decomposition, torn.decomposition.tearing.n_nodes * torn.components
+    size = torn.decomposition.tearing.n_nodes * torn.components
     loose = [each for each in turned if each.free.any()]
     loads = [np.linalg.solve(each.basis[1].T, each.driving) for each in loose]
     fields = [_on_rows(each, each.basis[0], size) for each in loose]
@@ -286,7 +286,7 @@ def tracked_motions(turned: Sequence[TurnedSurface], torn: TornSystem) -> FreeMo
         affine = np.einsum("na,bc->ncab", each.arms[:, :dim], np.eye(dim))
         fields.append(_on_rows(each, affine.reshape(dim * len(affine), dim * dim), size))
     load, nodes = np.concatenate(loads), sp.hstack(fields, format="csr")
-    rows = FreeMotions(nodes, np.zeros(nodes.shape[1])).of_rows(decomposition.gluing.dof, torn.measured)
+    rows = torn.groups.columns(nodes)
     rows, count = rows[torn.numbering.owned], len(load)
     columns = sp.hstack([rows[:, :count], torn.free.columns], format="csr")
     load = np.concatenate([load, torn.free.load])

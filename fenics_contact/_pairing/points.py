@@ -435,13 +435,12 @@ def closures_of(scene: Scene, points: ContactPoints) -> Closures | None:
     return Closures(points.area, curve, np.ones(points.count), known)
 
 
-def elastic_slip(scene: Scene, points: ContactPoints) -> np.ndarray | None:
-    """Return the elastic slip of contact points per friction force, 1/(k A), shape (n,); None without any."""
+def elastic_slip(scene: Scene, points: ContactPoints) -> np.ndarray:
+    """Return the elastic slip of contact points per friction force, 1/(k A), zero without any, shape (n,)."""
     stiffness = [pair.stick_stiffness for pair in scene.contacts]
-    if all(each is None for each in stiffness):
-        return None
     by_traction = np.array([0.0 if each is None else 1.0 / each for each in stiffness])
-    return np.asarray(by_traction[points.pair] / points.area)
+    elastic, slip = by_traction[points.pair] if len(stiffness) else np.zeros(0), np.zeros(points.count)
+    return np.divide(elastic, points.area, out=slip, where=elastic > 0.0)
 
 
 def reach_of(scene: Scene, points: ContactPoints) -> np.ndarray:
@@ -484,9 +483,8 @@ class NodeNumbers:
 
 
 def are_sliding(ties: Sequence[AnyTie], pair: np.ndarray) -> np.ndarray:
-    """Return whether tied points may slide, by the numbers of their pairs; those after the ties do not."""
-    sliding = np.array([*(tie.sliding for tie in ties), False], dtype=bool)
-    return np.asarray(sliding[np.minimum(pair, len(ties))])
+    """Return whether tied points may slide, by the numbers of their pairs."""
+    return np.array([tie.sliding for tie in ties], dtype=bool)[pair]
 
 
 #: Cosine between normals above which two points act in the same direction: corners stay what they are.

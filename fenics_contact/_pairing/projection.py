@@ -131,7 +131,7 @@ def warn_of_free_master(
 ) -> None:
     """Warn where supports hold what a tie would hold, and nothing holds the master there. Collective.
 
-    The support keeps such a component of the slave, see `feti.contact_rows.tied_relations`.
+    The support keeps such a component of the slave, see `feti.ties.bonded_rows`.
 
     `slave`, `master`: surfaces, and which components of their nodes supports prescribe, (n_nodes, dim).
     """

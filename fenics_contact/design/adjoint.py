@@ -115,12 +115,13 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     # Two slacks: every point that may be weak is counted, but only one that leans to no side is reassigned.
     uncertainty, closest = _uncertainty(torn.decomposition.comm, rows)
     reached = bound
-    if torn.elastic_slip is not None:
-        reached = bound * (1.0 + step[layout.tangential[:, 0]] * torn.elastic_slip[torn.owned_discs])
+    if torn.groups.slips.is_elastic:
+        elastic = torn.groups.slips.elastic_slip[torn.owned_discs]
+        reached = bound * (1.0 + step[layout.tangential[:, 0]] * elastic)
     counted = _on_switch(layout, trial, reached, coefficient, uncertainty)
     weak = _on_switch(layout, trial, reached, coefficient, closest)
 
-    known = classify(layout, bound, rows.multiplier, rows.residual, step, torn.compliance)
+    known = classify(layout, bound, rows.multiplier, rows.residual, step, torn.compliance.contact)
     direction = _directions(known.direction, trial[layout.tangential], length, weak.disc | weak.vanishing)
     held, at_rest = choice is WeakChoice.HELD, length <= closest[layout.tangential[:, 0]]
     face = replace(
@@ -421,7 +422,7 @@ def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Pa
     `by_position`: derivative of the objectives of all later steps by the relative tangential displacement
     after this step, owned, zero in all other rows, shape (n_owned,).
     """
-    columns, compliance = state.torn.free.columns, state.torn.compliance
+    columns, compliance = state.torn.free.columns, state.torn.compliance.contact
     if compliance is not None:  # the origin is without the elastic slip of this step
         by_force = own.by_multiplier - compliance.sprung(by_position)
         by_area = own.by_area - slips_by_area(state.torn, state.solution.multiplier, by_position)
@@ -440,12 +441,12 @@ def slips_by_area(torn: TornSystem, multiplier: np.ndarray, weight: np.ndarray) 
 
     `multiplier`: λ with the friction forces τ, owned; `weight`: of their rows, owned.
     """
-    result = np.zeros(torn.points.count)
-    if torn.elastic_slip is not None:
-        rows, width = torn.tangential_rows.ravel(), torn.components - 1
-        tau, by_slip = (torn.numbering.gather(x, rows).reshape(-1, width) for x in (multiplier, weight))
-        area = torn.points.area[torn.frictional]
-        result[torn.frictional] = -torn.elastic_slip / area * np.einsum("na,na->n", tau, by_slip)
+    result, slips = np.zeros(torn.points.count), torn.groups.slips
+    if slips.is_elastic:
+        width = torn.components - 1
+        tau, by_slip = (torn.gathered(x, slips).reshape(-1, width) for x in (multiplier, weight))
+        area = torn.points.area[slips.frictional]
+        result[slips.frictional] = -slips.elastic_slip / area * np.einsum("na,na->n", tau, by_slip)
     return result
 
 
@@ -456,7 +457,7 @@ def by_slip_origin(state: State, own: Partials, adjoint_multiplier: np.ndarray) 
     origin is c: the derivative is ζ − ∂J/∂(B u − c) in tangential rows.
     """
     torn = state.torn
-    tangential = torn.numbering.owned >= torn.n_equality + torn.points.count
+    tangential = torn.groups.marks([torn.groups.slips])[torn.numbering.owned]
     return np.where(tangential, adjoint_multiplier - own.by_jump, 0.0)
 
 
@@ -507,7 +508,7 @@ def state_error(
     """
     torn, rows, layout = state.torn, state.rows, state.torn.layout
     trial = rows.multiplier - rows.step * rows.residual
-    feasible, compliance = FeasibleSet(layout, rows.slip_bound), torn.compliance
+    feasible, compliance = FeasibleSet(layout, rows.slip_bound), torn.compliance.contact
     if compliance is None:
         miss = rows.multiplier - feasible.project(trial)
     else:

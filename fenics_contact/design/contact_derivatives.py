@@ -35,6 +35,7 @@ from fenics_contact.design.surface_derivatives import (
 )
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.feti.constraints import ConstraintRows
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.shapes.simple import evaluate_shape
 
@@ -61,9 +62,9 @@ def bounds_by_area(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndar
     """
     by_area = np.zeros(torn.points.count)
     area = torn.points.area[torn.frictional]
-    slope = torn.tresca_bound / np.where(area > 0.0, area, 1.0)
-    if torn.strengths is not None:
-        slope = slope + torn.strengths.by_area(normal_force[torn.frictional])
+    slope = torn.groups.slips.tresca_bound / np.where(area > 0.0, area, 1.0)
+    if torn.groups.slips.strengths is not None:
+        slope = slope + torn.groups.slips.strengths.by_area(normal_force[torn.frictional])
     by_area[torn.frictional] = by_bound * slope
     return by_area
 
@@ -73,12 +74,12 @@ def closures_by_area(torn: TornSystem, multiplier: np.ndarray, adjoint: np.ndarr
 
     `multiplier`: λ, owned; `adjoint`: its ζ, owned. Zero where contact is exact.
     """
-    if torn.compliance is None:
+    if torn.compliance.contact is None:
         return 0.0
     by_area = slips_by_area(torn, multiplier, adjoint)
-    if torn.closures is not None:
+    if torn.groups.normal.closures is not None:
         force, weight = (torn.numbering.gather(x, torn.normal_rows) for x in (multiplier, adjoint))
-        by_area += weight * torn.closures.by_area(force)
+        by_area += weight * torn.groups.normal.closures.by_area(force)
     return by_area
 
 
@@ -95,8 +96,8 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
     result, by_all = np.zeros((points.count, torn.components)), np.zeros(points.count)
     by_all[torn.frictional] = by_bound
     limited = np.zeros(points.count, dtype=bool)
-    if torn.strengths is not None:
-        limited[torn.frictional] = torn.strengths.limited(normal_force[torn.frictional])
+    if torn.groups.slips.strengths is not None:
+        limited[torn.frictional] = torn.groups.slips.strengths.limited(normal_force[torn.frictional])
     places = torn.scene.points[points.slave]
     for index, pair in enumerate(torn.scene.contacts):
         if pair.friction_varies:
@@ -276,7 +277,7 @@ class RowFields(PointMotions):
 def _require_own_rows(torn: TornSystem, points: ContactPoints) -> None:
     """Reject means over the facets at two periodic edges, whose shares would change with the shape."""
     diagonal = np.asarray(points.master[np.arange(points.count), points.slave]).ravel()
-    if torn.constraints is not None and np.any(np.abs(diagonal) > HELD):
+    if np.any(np.abs(diagonal) > HELD) and torn.groups.of(ConstraintRows):
         raise InvalidInputError(
             "derivatives by the shape need surfaces that end at periodic edges to meet alike at both, got "
             f"{np.count_nonzero(np.abs(diagonal) > HELD)} points that are means over different facets: give "
@@ -447,58 +448,62 @@ def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
     ones by its normals, too.
     """
     result = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
-    if torn.ties.count == 0:
-        return result
-    _require_own_rows(torn, torn.ties)
     masters = [tie.master for tie in torn.scene.ties]
-    motions = point_motions(torn, torn.ties, masters, fields)
-    forces = _forces(torn, fields.multipliers)
-    for index, tie in enumerate(torn.scene.ties):
-        mine = np.flatnonzero(torn.ties.pair == index)
-        assert isinstance(tie, Tie)
-        add = _add_tie if tie.discretisation == "node" else _add_mortar_tie
-        add(result, torn, tie, motions, forces[:, mine], mine)
-    return result
-
-
-def _forces(torn: TornSystem, multipliers: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Return the multipliers of the rows times their directions, summed at each point, (2, n, dim)."""
-    rows = torn.relations[0]
-    result = np.zeros((2, torn.ties.count, torn.components))
-    for force, multiplier in zip(result, multipliers, strict=True):
-        values = torn.numbering.gather(multiplier, torn.n_gluing + np.arange(rows.count))
-        np.add.at(force, rows.which, values[:, None] * rows.directions)
+    for rows in torn.tie_rows:
+        points = rows.points
+        if points.count == 0:
+            continue
+        _require_own_rows(torn, points)
+        motions = point_motions(torn, points, masters, fields)
+        forces = np.stack([rows.along_rows(torn.gathered(x, rows)) for x in fields.multipliers])
+        for index in np.unique(points.pair):
+            tie, mine = torn.scene.ties[index], np.flatnonzero(points.pair == index)
+            assert isinstance(tie, Tie)
+            add = _add_tie if tie.discretisation == "node" else _add_mortar_tie
+            add(result, torn, points, tie, motions, forces[:, mine], mine)
     return result
 
 
 def _add_tie(
-    result: np.ndarray, torn: TornSystem, tie: Tie, motions: PointMotions, force: np.ndarray, mine: np.ndarray
+    result: np.ndarray,
+    torn: TornSystem,
+    points: ContactPoints,
+    tie: Tie,
+    motions: PointMotions,
+    force: np.ndarray,
+    mine: np.ndarray,
 ) -> None:
     """Add the derivative by slave and master nodes of one tie; a row is d·(v_s − Σ w_j v_j)."""
-    points, surface = torn.ties, surface_of(torn.scene, tie.master, "faceted")
+    surface = surface_of(torn.scene, tie.master, "faceted")
     nodes = torn.decomposition.tearing.global_nodes(tie.master.body, surface.nodes)
     carrying, gradients = carriers(surface, points.facet[mine], points.local[mine])
     weight = np.einsum("knd,knjd->nj", force, motions.at(nodes[carrying]))
-    by_normal = _by_normal(torn, tie, motions, force, mine)
+    by_normal = _by_normal(points, tie, motions, force, mine)
     tangents = np.zeros_like(points.tangents[mine])
     by = PointDerivatives(np.zeros(len(mine)), by_normal, tangents, weight, points.axes[mine], gradients)
     _add_projection(result, surface, nodes, points, mine, by)
 
 
 def _add_mortar_tie(
-    result: np.ndarray, torn: TornSystem, tie: Tie, motions: PointMotions, force: np.ndarray, mine: np.ndarray
+    result: np.ndarray,
+    torn: TornSystem,
+    points: ContactPoints,
+    tie: Tie,
+    motions: PointMotions,
+    force: np.ndarray,
+    mine: np.ndarray,
 ) -> None:
     """Add the derivative by slave and master nodes of one tie of weighted means. Collective."""
     none = np.zeros(len(mine))
-    by = MortarDerivatives(force, _by_normal(torn, tie, motions, force, mine), none, none)
-    result += mortar_by_shape(torn, tie, torn.ties.slave[mine], motions, by)
+    by = MortarDerivatives(force, _by_normal(points, tie, motions, force, mine), none, none)
+    result += mortar_by_shape(torn, tie, points.slave[mine], motions, by)
 
 
 def _by_normal(
-    torn: TornSystem, tie: Tie, motions: PointMotions, force: np.ndarray, mine: np.ndarray
+    points: ContactPoints, tie: Tie, motions: PointMotions, force: np.ndarray, mine: np.ndarray
 ) -> np.ndarray:
     """Return the derivative by the normals, shape (n, dim): rows of sliding ties lie along −n."""
     if not tie.sliding:
-        return np.zeros((len(mine), torn.components))
-    along = -np.einsum("knd,nd->kn", force, torn.ties.normal[mine])
+        return np.zeros(points.normal[mine].shape)
+    along = -np.einsum("knd,nd->kn", force, points.normal[mine])
     return np.einsum("kn,knd->nd", along, motions.relative[:, mine])

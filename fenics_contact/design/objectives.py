@@ -409,9 +409,9 @@ class FrictionWork(Weighable):
         force, slip = self._vectors(state)
         value, by_force, torn = float((force * slip).sum()), slip, state.torn
         by_area: np.ndarray | float = 0.0
-        if torn.elastic_slip is not None:
+        if torn.groups.slips.is_elastic:
             elastic = np.zeros(torn.points.count)
-            elastic[torn.frictional] = torn.elastic_slip
+            elastic[torn.frictional] = torn.groups.slips.elastic_slip
             by_force = slip - elastic[:, None] * force
             by_area = elastic / torn.points.area * np.einsum("na,na->n", force, force)
         by_slip, free = on_rows(state, None, force), state.torn.free

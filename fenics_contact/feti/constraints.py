@@ -21,21 +21,22 @@ from scipy.sparse.linalg import SuperLU, splu
 from fenics_contact._base.display import counted
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.following import followed_nodes
-from fenics_contact._pairing.points import HELD
+from fenics_contact._pairing.points import HELD, ContactPoints
 from fenics_contact._scene.constraints import LinearConstraint
 from fenics_contact._scene.local_axes import LocalAxes, free_matrix
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.contact_rows import on_copies
-from fenics_contact.feti.decomposition import Decomposition, DualNumbering, Rows, Tearing
+from fenics_contact.feti.decomposition import Decomposition, Rows, Tearing
+from fenics_contact.feti.row_groups import Joint, columns_of
 
 _LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
-class ConstraintRows:
-    """The last equality rows, replicated.
+class ConstraintRows(Joint):
+    """Rows of linear constraints.
 
     Attributes:
         constraints: The constraints, for names.
@@ -61,11 +62,33 @@ class ConstraintRows:
     fixed: np.ndarray
     axes: LocalAxes | None = None
 
-    #: As for rows of contacts, see `Relations`: none is in B without acting.
-    resting = None
+    @classmethod
+    def key(cls, scene: Scene) -> Sequence[object]:
+        """Return the constraints but for their values."""
+        return [each.key for each in scene.constraints]
 
     @classmethod
-    def of(cls, scene: Scene, tearing: Tearing, fixed: np.ndarray, axes: LocalAxes | None) -> ConstraintRows:
+    def of(
+        cls, scene: Scene, decomposition: Decomposition, ties: ContactPoints, known: Sequence[ConstraintRows]
+    ) -> Sequence[ConstraintRows]:
+        """Return those of a scene with constraints. Collective."""
+        if not scene.constraints:
+            return ()
+        for each in known:
+            same = np.array_equal(each.fixed, decomposition.fixed)
+            if same and [one.key for one in each.constraints] == cls.key(scene):
+                return (each,)
+        with together(decomposition.comm):
+            found = cls.built(scene, decomposition.tearing, decomposition.fixed, decomposition.axes)
+        if decomposition.comm.rank == 0 and found.left_out:
+            words = "%d of %d equations of linear constraints follow from others or from supports: left out"
+            safe_log(_LOG.info, words, found.left_out, found.first[-1])
+        return (found,)
+
+    @classmethod
+    def built(
+        cls, scene: Scene, tearing: Tearing, fixed: np.ndarray, axes: LocalAxes | None
+    ) -> ConstraintRows:
         """Return those of a scene; `fixed`: see `Relations.rows`."""
         equations, first = _equations(scene, tearing)
         size = _lengths(equations)
@@ -107,7 +130,7 @@ class ConstraintRows:
         """Number of equations that follow from others or from supports."""
         return int(self.lost.shape[0])
 
-    def rows(self, tearing: Tearing) -> Rows:
+    def rows(self, tearing: Tearing, fixed: np.ndarray) -> Rows:
         """Return the rows of B, which act on free components."""
         entries = self.free.tocoo()
         order = np.lexsort((entries.col, entries.row))
@@ -116,25 +139,29 @@ class ConstraintRows:
         anchor = node[np.searchsorted(row, np.arange(self.count))]
         return on_copies(tearing, row, node, component, value, anchor)
 
+    def measured(self, field: np.ndarray) -> np.ndarray:
+        """Return what a displacement of all nodes is in the rows, shape (n_rows,)."""
+        return np.asarray(self.whole @ field.ravel())
+
     def of_supports(self, prescribed: np.ndarray) -> np.ndarray:
         """Return the contribution of prescribed displacements to each row, shape (n_rows,), [length].
 
         `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
         """
-        return np.asarray(self.whole @ self.moved(prescribed))
+        return self.measured(self.moved(prescribed))
 
     def moved(self, prescribed: np.ndarray) -> np.ndarray:
         """Return prescribed displacements, zero where free, along the coordinates' axes, (n_dofs,)."""
         known = np.nan_to_num(prescribed)
         return np.asarray((known if self.axes is None else self.axes.to_global(known)).ravel())
 
-    def held(self, fixed: np.ndarray) -> np.ndarray:
-        """Return which rows supports determine: none, these are left out."""
-        return np.zeros(self.count, dtype=bool)
+    def columns(self, fields: sp.csr_matrix) -> sp.csr_matrix:
+        """Return by how much fields of nodes, (n_nodes · components, n), close the rows, (n_rows, n)."""
+        return columns_of(self, fields, self.components)
 
-    def right(self, constraints: Sequence[LinearConstraint]) -> np.ndarray:
+    def right(self, scene: Scene, prescribed: np.ndarray) -> np.ndarray:
         """Return S T b for the values of constraints, shape (n_rows,), [length]."""
-        return np.asarray(self.kept @ self._values(constraints))
+        return np.asarray(self.kept @ self._values(scene.constraints))
 
     def _values(self, constraints: Sequence[LinearConstraint]) -> np.ndarray:
         values = np.zeros(int(self.first[-1]))
@@ -149,12 +176,8 @@ class ConstraintRows:
             values[own] = each.value
         return values
 
-    def require_consistent(
-        self,
-        constraints: Sequence[LinearConstraint],
-        prescribed: np.ndarray,
-        moving: sp.csr_matrix,
-        near: float = 1e-6,
+    def check(
+        self, scene: Scene, prescribed: np.ndarray, moving: sp.csr_matrix, near: float = 1e-6
     ) -> None:
         """Reject equations that contradict others or supports.
 
@@ -163,7 +186,7 @@ class ConstraintRows:
         """
         if not self.left_out:
             return
-        values, given = self._values(constraints), self.equations @ self.moved(prescribed)
+        values, given = self._values(scene.constraints), self.equations @ self.moved(prescribed)
         scale = max(np.abs(values).max(), np.abs(given).max())
         left = np.abs(self._left(values - given))
         if (left > near * scale).any():
@@ -196,21 +219,24 @@ class ConstraintRows:
         within = f"equation {equation - int(self.first[number])} of " if count > 1 else ""
         return f"{within}LinearConstraint {self.constraints[number].label!r}"
 
-    def forces(self, numbering: DualNumbering, first: int, multiplier: np.ndarray) -> np.ndarray:
-        """Return the force of each equation on a unit of its factors, replicated. Collective.
+    def forces(self, multiplier: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+        """Return the force of each equation on a unit of its factors, shape (n_equations,), [force]."""
+        return -np.asarray(self.kept.T @ multiplier)
 
-        `numbering`: that of all rows; `first`: the first one of constraints; `multiplier`: λ, owned.
-        The result has shape (n_equations,), [force].
-        """
-        rows = first + np.arange(self.count)
-        return -np.asarray(self.kept.T @ numbering.gather(multiplier, rows))
-
-    def on_nodes(self, forces: np.ndarray, constraint: int | None = None) -> np.ndarray:
-        """Return what equations, or those of one constraint, exert, shape (n_nodes, components), [force]."""
-        if constraint is not None:
-            mine = slice(int(self.first[constraint]), int(self.first[constraint + 1]))
-            return np.asarray(self.equations[mine].T @ forces[mine]).reshape(-1, self.components)
+    def on_nodes(self, forces: np.ndarray) -> np.ndarray:
+        """Return what equations exert, shape (n_nodes, components), [force]."""
         return np.asarray(self.equations.T @ forces).reshape(-1, self.components)
+
+    def of_one(self, forces: np.ndarray, constraint: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the forces of the equations of one constraint, and what these exert on nodes."""
+        mine = slice(int(self.first[constraint]), int(self.first[constraint + 1]))
+        on_nodes = np.asarray(self.equations[mine].T @ forces[mine]).reshape(-1, self.components)
+        return forces[mine], on_nodes
+
+    def wrenches(self, modes: np.ndarray, nodes: slice) -> np.ndarray:
+        """Return the work of unit multipliers, shape (n_modes, n_rows)."""
+        own = slice(nodes.start * self.components, nodes.stop * self.components)
+        return np.asarray(self.whole[:, own] @ modes.reshape(-1, modes.shape[2])).T
 
 
 def _onto_free(fixed: np.ndarray, axes: LocalAxes | None) -> sp.csr_matrix:
@@ -319,24 +345,3 @@ def factored(gram: sp.csr_matrix, regular: float = 1e-13) -> SuperLU:
 def _pivots(factor: SuperLU) -> np.ndarray:
     """Return the pivot of each row."""
     return np.asarray(factor.U.diagonal()[factor.perm_c])
-
-
-def constraint_rows(
-    scene: Scene, decomposition: Decomposition, known: ConstraintRows | None
-) -> ConstraintRows | None:
-    """Return the rows of a scene, None without any. Collective.
-
-    `known`: those of the scene with another geometry or load, which may be the same.
-    """
-    if not scene.constraints:
-        return None
-    if known is not None and not np.array_equal(known.fixed, decomposition.fixed):
-        known = None
-    if known is not None and [each.key for each in known.constraints] == [c.key for c in scene.constraints]:
-        return known
-    with together(decomposition.comm):
-        found = ConstraintRows.of(scene, decomposition.tearing, decomposition.fixed, decomposition.axes)
-    if decomposition.comm.rank == 0 and found.left_out:
-        words = "%d of %d equations of linear constraints follow from others or from supports: left out"
-        safe_log(_LOG.info, words, found.left_out, found.first[-1])
-    return found

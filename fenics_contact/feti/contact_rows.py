@@ -1,39 +1,49 @@
-"""Rows of B at contact points: gap along the normal, slip along the tangents, all components where tied."""
+"""Rows of B at contact points: gap along the normal, and slip along the tangents."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.sparse as sp
 
+from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import LAST_PLACES
-from fenics_contact._pairing.points import HELD, ContactPoints, FreeSpaces, are_sliding
+from fenics_contact._pairing.points import (
+    HELD,
+    ContactPoints,
+    FreeSpaces,
+    closures_of,
+    elastic_slip,
+    friction_data,
+    reach_of,
+)
 from fenics_contact._scene.local_axes import LocalAxes, free_part
-from fenics_contact._scene.sectors import AnyTie
+from fenics_contact._scene.scene import Scene
 from fenics_contact.feti.decomposition import Rows, Tearing
+from fenics_contact.feti.initial_gaps import gap_with_room
+from fenics_contact.feti.row_groups import RowGroup, columns_of
+from fenics_contact.qp.cones import Strengths
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.compliance import Closures
 
 
-@dataclass(frozen=True)
-class Relations:
+@dataclass(frozen=True, eq=False)
+class Relations(RowGroup):
     """The relative displacement that each row measures: d·(u_slave − Σ w_j u_master,j).
 
     Attributes:
         which: Point of each row, shape (n_rows,).
         directions: d of each row, shape (n_rows, dim).
-        resting: Marks of friction rows along which supports prescribe no slip, shape (n_rows,); None for
-            other rows.
         axes: Axes of nodes along which supports prescribe components; None: the coordinates' everywhere.
-        sprung: Number of the last rows, which are those of springs: their forces act also where supports
-            determine them.
     """
 
     points: ContactPoints
     which: np.ndarray
     directions: np.ndarray
-    resting: np.ndarray | None = None
-    axes: LocalAxes | None = None
-    sprung: int = 0
+    axes: LocalAxes | None = field(default=None, kw_only=True)
 
     @property
     def count(self) -> int:
@@ -45,51 +55,29 @@ class Relations:
         """Displacement components of a node."""
         return int(self.directions.shape[1])
 
+    def measured(self, field: np.ndarray) -> np.ndarray:
+        """Return what a displacement of all nodes along the coordinates is in the rows, shape (n_rows,)."""
+        return np.einsum("rd,rd->r", self.directions, self.points.relative(field)[self.which])
+
     def of_supports(self, prescribed: np.ndarray) -> np.ndarray:
         """Return the contribution of prescribed displacements to each row, shape (n_rows,), [length].
 
         `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
         """
         known = np.nan_to_num(prescribed)
-        moved = self.points.relative(known if self.axes is None else self.axes.to_global(known))
-        along = np.einsum("rd,rd->r", self.directions, moved[self.which])
+        along = self.measured(known if self.axes is None else self.axes.to_global(known))
         # What is left of motions that cancel is none: slip along it would have friction.
         least = LAST_PLACES * np.abs(known).max(initial=0.0)
         return np.where(np.abs(along) <= least, 0.0, along)
 
-    def held(self, fixed: np.ndarray, parallel: float = 1e-6) -> np.ndarray:
-        """Return which rows supports determine, alone or with the normal row, shape (n_rows,).
+    def columns(self, fields: sp.csr_matrix) -> sp.csr_matrix:
+        """Return by how much fields of nodes, (n_nodes · dim, n), close the rows, shape (n_rows, n)."""
+        return columns_of(self, fields, self.components)
 
-        With rollers on both sides, the free part of a tangent is parallel to that of the normal: along it a
-        closed point cannot slip, and an open one opens. Such a row is left to the normal one unless it has
-        the larger free part, or supports drive the point along it: then it slips.
-
-        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `parallel`: directions
-        count as parallel if their sine is below this.
-        """
-        free = FreeSpaces.of(self.points, fixed, self.axes)
-        left = free.part(self.directions, self.which)
-        mine = np.einsum("rd,rd->r", left, left)
-        if self.resting is None:
-            return np.asarray((mine <= HELD**2) & (np.arange(self.count) < self.count - self.sprung))
-        normal = free.part(self.points.normal[self.which], self.which)
-        other = np.einsum("rd,rd->r", normal, normal)
-        across = mine * other - np.einsum("rd,rd->r", left, normal) ** 2
-        tilted = (across <= parallel**2 * mine * other) & (mine < other)
-        return np.asarray((mine <= HELD**2) | (self.resting & tilted))
-
-    def along_normals(self, fixed: np.ndarray) -> np.ndarray:
-        """Return free parts of directions along those of the normals, relative to these, shape (n_rows,)."""
-        free = FreeSpaces.of(self.points, fixed, self.axes)
-        left = free.part(self.directions, self.which)
-        normal = free.part(self.points.normal[self.which], self.which)
-        size = np.einsum("rd,rd->r", normal, normal)
-        return np.einsum("rd,rd->r", left, normal) / np.where(size > HELD**2, size, np.inf)
-
-    def freedom(self, fixed: np.ndarray) -> np.ndarray:
-        """Return the length of the free part of each direction, from 0 to 1, shape (n_rows,)."""
-        free = FreeSpaces.of(self.points, fixed, self.axes)
-        return np.asarray(np.linalg.norm(free.part(self.directions, self.which), axis=1))
+    def held(self, fixed: np.ndarray) -> np.ndarray:
+        """Return which rows supports determine, shape (n_rows,)."""
+        left = FreeSpaces.of(self.points, fixed, self.axes).part(self.directions, self.which)
+        return np.asarray(np.einsum("rd,rd->r", left, left) <= HELD**2)
 
     def rows(self, tearing: Tearing, fixed: np.ndarray) -> Rows:
         """Return the part of these rows of B that acts on free components, with an empty right side.
@@ -133,45 +121,145 @@ def on_copies(
     return Rows(row[entry], copy, component[entry], value, np.zeros(len(slaves)), owner)
 
 
-def normal_relations(points: ContactPoints, axes: LocalAxes | None = None) -> Relations:
-    """Return −n·(u_slave − u_master) ≤ gap, one row for each contact point."""
-    return Relations(points, np.arange(points.count), -points.normal, axes=axes)
+@dataclass(frozen=True, eq=False)
+class NormalRows(Relations):
+    """Rows −n·(u_slave − u_master) ≤ gap, one for each contact point.
 
-
-def tangential_relations(
-    points: ContactPoints,
-    frictional: np.ndarray,
-    prescribed: np.ndarray,
-    axes: LocalAxes | None = None,
-) -> Relations:
-    """Return the slip t_a·(u_slave − u_master): dim − 1 consecutive rows for each frictional point.
-
-    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim), along their
-    `axes`.
+    Attributes:
+        closures: Closures of the contact points under their forces, replicated; None where contact is exact.
     """
-    dim = points.normal.shape[1]
-    which, directions = np.repeat(frictional, dim - 1), points.tangents[frictional].reshape(-1, dim)
-    rows = Relations(points, which, directions, axes=axes)
-    return replace(rows, resting=rows.of_supports(prescribed) == 0.0)
+
+    closures: Closures | None = field(default=None, kw_only=True)
+
+    @classmethod
+    def of(cls, scene: Scene, points: ContactPoints, axes: LocalAxes | None = None) -> NormalRows:
+        """Return those of the contact points of a scene."""
+        every = np.arange(points.count)
+        return cls(points, every, -points.normal, axes=axes, closures=closures_of(scene, points))
+
+    def right(self, scene: Scene, prescribed: np.ndarray) -> np.ndarray:
+        """Return the gaps at which pressure begins, shape (n_points,), [length]."""
+        return np.asarray(self.gap(prescribed) - self.reach(scene))
+
+    def gap(self, prescribed: np.ndarray) -> np.ndarray:
+        """Return the gaps, with room between surfaces that supports hold, shape (n_points,), [length]."""
+        freedom, moved = self.freedom(~np.isnan(prescribed)), self.of_supports(prescribed)
+        return gap_with_room(self.points, freedom, moved, self.soft)
+
+    def reach(self, scene: Scene) -> np.ndarray | float:
+        """Return the distances at which pressure begins, shape (n_points,); zero where contact is exact."""
+        return 0.0 if self.closures is None else reach_of(scene, self.points)
+
+    @property
+    def soft(self) -> np.ndarray:
+        """Marks of points that give way, shape (n_points,)."""
+        return np.zeros(self.count, dtype=bool) if self.closures is None else self.closures.curve >= 0
+
+    def freedom(self, fixed: np.ndarray) -> np.ndarray:
+        """Return the length of the free part of each direction, from 0 to 1, shape (n_rows,)."""
+        free = FreeSpaces.of(self.points, fixed, self.axes)
+        return np.asarray(np.linalg.norm(free.part(self.directions, self.which), axis=1))
 
 
-def tied_relations(
-    points: ContactPoints, ties: Sequence[AnyTie], fixed: np.ndarray, axes: LocalAxes | None = None
-) -> Relations:
-    """Return u_slave − u_master = 0 at tied points, only along the normal where the tie may slide.
+@dataclass(frozen=True, eq=False)
+class TangentialRows(Relations):
+    """The slip t_a·(u_slave − u_master): dim − 1 consecutive rows for each frictional point.
 
-    A component that a support prescribes on the slave node is left to the support.
-
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
+    Attributes:
+        resting: Marks of rows along which supports prescribe no slip, shape (n_rows,).
+        frictional: Numbers of the contact points with friction, replicated, shape (n_friction,).
+        coefficient: μ of each of these (zero under Tresca), replicated, shape (n_friction,).
+        tresca_bound: Fixed slip bound of each, replicated, shape (n_friction,), [force].
+        elastic_slip: Slip of sticking points per friction force, replicated, shape (n_friction,), [length /
+            force].
+        strengths: Slip bounds with limits or on curves in place of μ λ_N, whose μ is then the largest ratio,
+            replicated; None where there are none.
     """
-    dim = points.normal.shape[1]
-    sliding = are_sliding(ties, points.pair)
-    bonded, component = np.nonzero(~sliding[:, None] & ~fixed[points.slave])
-    gliding = np.flatnonzero(sliding)
-    along = np.eye(dim)[component]
-    if axes is not None:
-        place = axes.place(points.slave[bonded])
-        turned = place >= 0
-        along[turned] = axes.axes[place[turned], component[turned]]
-    which = np.concatenate([bonded, gliding])
-    return Relations(points, which, np.concatenate([along, -points.normal[gliding]]), axes=axes)
+
+    from_before = True
+
+    resting: np.ndarray
+    frictional: np.ndarray
+    coefficient: np.ndarray
+    tresca_bound: np.ndarray
+    elastic_slip: np.ndarray
+    strengths: Strengths | None
+
+    def held(self, fixed: np.ndarray, parallel: float = 1e-6) -> np.ndarray:
+        """Return which rows supports determine, alone or with the normal row, shape (n_rows,).
+
+        With rollers on both sides, the free part of a tangent is parallel to that of the normal: along it a
+        closed point cannot slip, and an open one opens. Such a row is left to the normal one unless it has
+        the larger free part, or supports drive the point along it: then it slips.
+
+        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `parallel`: directions
+        count as parallel if their sine is below this.
+        """
+        free = FreeSpaces.of(self.points, fixed, self.axes)
+        left = free.part(self.directions, self.which)
+        mine = np.einsum("rd,rd->r", left, left)
+        normal = free.part(self.points.normal[self.which], self.which)
+        other = np.einsum("rd,rd->r", normal, normal)
+        across = mine * other - np.einsum("rd,rd->r", left, normal) ** 2
+        tilted = (across <= parallel**2 * mine * other) & (mine < other)
+        return np.asarray((mine <= HELD**2) | (self.resting & tilted))
+
+    def along_normals(self, fixed: np.ndarray) -> np.ndarray:
+        """Return free parts of directions along those of the normals, relative to these, shape (n_rows,)."""
+        free = FreeSpaces.of(self.points, fixed, self.axes)
+        left = free.part(self.directions, self.which)
+        normal = free.part(self.points.normal[self.which], self.which)
+        size = np.einsum("rd,rd->r", normal, normal)
+        return np.einsum("rd,rd->r", left, normal) / np.where(size > HELD**2, size, np.inf)
+
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        points: ContactPoints,
+        prescribed: np.ndarray,
+        comm: MPI.Comm,
+        axes: LocalAxes | None = None,
+    ) -> TangentialRows:
+        """Return those of the contact points of a scene. Collective on ``comm``.
+
+        `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim), along their
+        `axes`.
+        """
+        has_friction, coefficient, bound, strengths = friction_data(scene, points, comm)
+        frictional, dim = np.flatnonzero(has_friction), points.normal.shape[1]
+        which, directions = np.repeat(frictional, dim - 1), points.tangents[frictional].reshape(-1, dim)
+        driven = Relations(points, which, directions, axes=axes).of_supports(prescribed)
+        return cls(
+            points, which, directions, driven == 0.0, frictional, coefficient[frictional], bound[frictional],
+            elastic_slip(scene, points)[frictional],
+            None if strengths is None else strengths.part(frictional), axes=axes,
+        )  # fmt: skip
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether some points give way before they slip."""
+        return bool(np.any(self.elastic_slip > 0.0))
+
+    @property
+    def frictionless(self) -> np.ndarray:
+        """Numbers of the contact points without friction, shape (n_contact − n_friction,)."""
+        return np.setdiff1d(np.arange(self.points.count), self.frictional, assume_unique=True)
+
+    def driven_as(self, prescribed: np.ndarray) -> bool:
+        """Return whether supports drive the same points, see `of`."""
+        return np.array_equal(self.of_supports(prescribed) == 0.0, self.resting)
+
+    def slip_bound(self, normal_force: np.ndarray) -> np.ndarray:
+        """Return Ψ at normal forces of the frictional points, shape (n_friction,), [force]."""
+        if self.strengths is not None:
+            return self.tresca_bound + self.strengths.bound(normal_force)
+        return np.asarray(self.tresca_bound + self.coefficient * np.maximum(normal_force, 0))
+
+    def with_coefficient(self, coefficient: np.ndarray) -> TangentialRows:
+        """Return the same rows with other friction coefficients, shape (n_friction,)."""
+        strengths = self.strengths
+        if strengths is not None:
+            strengths = replace(strengths, coefficient=coefficient)
+        return replace(self, coefficient=coefficient, strengths=strengths)

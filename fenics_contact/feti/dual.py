@@ -57,7 +57,7 @@ class DirichletPreconditioner:
         of D⁻¹, shape (n_interface,), the same for all components of a node.
         """
         self._inverse, self._numbering = inverse, numbering
-        self._sprung: np.ndarray | None = None
+        self._soft, self._sprung = np.zeros(0, dtype=np.int64), np.zeros(0)
         self._B = scaled_columns(B, compliance)
         self._Bt = self._B.T  # shares its memory
         diagonal = numbering.to_owned(np.asarray(B.multiply(self._B).sum(axis=1)).ravel())
@@ -84,19 +84,21 @@ class DirichletPreconditioner:
         """
         return Lifting(self, self._contact.on_face(restriction))
 
-    def soften(self, give: np.ndarray) -> None:
+    def soften(self, rows: np.ndarray, compliance: np.ndarray) -> None:
         """Add 1 / C on rows that give way, which move nothing or depend on each other. Collective.
 
-        `give`: C, owned, zero on rows that do not give way.
+        `rows`: their positions among the owned ones, shape (k,); `compliance`: C of each, shape (k,).
         """
-        soft = give > 0.0
-        self._sprung = np.divide(1.0, give, where=soft, out=np.zeros(len(give)))
-        self._contact = self._contact.softened(soft)
+        self._soft, self._sprung = rows, 1.0 / compliance
+        marks = np.zeros(len(self._equality), dtype=bool)
+        marks[rows] = True
+        self._contact = self._contact.softened(marks)
 
     def _apply(self, residual: np.ndarray, contact: ContactBlock) -> np.ndarray:
         count_flops(self._numbering.comm, self._inverse.flops[1] + 4 * self._B.nnz)
         result = self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
-        return result if self._sprung is None else result + self._sprung * residual
+        result[self._soft] += self._sprung * residual[self._soft]
+        return result
 
     def _jump(self, residual: np.ndarray, contact: ContactBlock) -> np.ndarray:
         """Return D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹ r on the interface. Collective."""
@@ -209,7 +211,7 @@ class DualSystem:
         bent = self.inverse(torn.load)
         self._bent = bent[self.inverse.interface]
         rhs = self.jump(bent) - torn.right
-        self.problem = replace(self.problem, rhs=rhs, compliance=torn.compliance, given=torn.right)
+        self.problem = replace(self.problem, rhs=rhs, compliance=torn.compliance.contact, given=torn.right)
 
     def _inverse(
         self, torn: TornSystem, condensations: Condensations, kind: LocalKind, known: TornInverse | None
@@ -264,8 +266,8 @@ class DualSystem:
             preconditioner = DirichletPreconditioner(
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
-            if torn.give is not None:
-                preconditioner.soften(torn.give)
+            if torn.groups.compliance.any():
+                preconditioner.soften(torn.compliance.soft, torn.compliance.constant)
             diagonal, supported = self._diagonal()
             scaling = self._scaling(coarse)
         nothing = np.zeros(len(torn.numbering.owned))
@@ -285,7 +287,7 @@ class DualSystem:
         )
 
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
-        """Return F λ = B K⁺ Bᵀ λ for an owned vector, with C λ on rows of springs. Collective.
+        """Return F λ = B K⁺ Bᵀ λ for an owned vector, with C λ on rows of joints that give way. Collective.
 
         In double precision, however K⁺ is stored.
         """
@@ -302,11 +304,11 @@ class DualSystem:
 
     def _applied(self, flex: Callable[[np.ndarray], np.ndarray], multiplier: np.ndarray) -> np.ndarray:
         self.products += 1
-        numbering, give = self.torn.numbering, self.torn.give
+        numbering = self.torn.numbering
         count_flops(numbering.comm, self.inverse.flops[0] + 4 * self._B_interface.nnz)
         force = self._Bt_interface @ numbering.to_local(multiplier)
         product = numbering.to_owned(self._B_interface @ flex(force))
-        return product if give is None else product + give * multiplier
+        return self.torn.compliance.added(product, multiplier)
 
     def reach(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return abs(B) abs(u), the size of the displacements at each row, owned, [length]. Collective."""

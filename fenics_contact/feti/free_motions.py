@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,12 +14,9 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import AnySupport, RigidSurface
 from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.feti.constraints import ConstraintRows
-from fenics_contact.feti.contact_rows import Relations
+from fenics_contact.feti.all_rows import RowGroups
 from fenics_contact.feti.decomposition import Tearing
-
-#: What measures relative displacements in rows.
-Measured: TypeAlias = Relations | ConstraintRows
+from fenics_contact.feti.row_groups import Unknowns
 
 
 @displayed
@@ -57,29 +52,34 @@ class FreeMotions:
         """Number of unknowns."""
         return len(self.load)
 
-    def of_rows(self, dof: np.ndarray, relations: Sequence[Measured]) -> sp.csr_matrix:
-        """Return Q of all rows, shape (n_rows, n), of those on nodes."""
-        return sp.vstack([self.columns[dof], *_of_relations(self.columns, relations)], format="csr")
+    def on_rows(self, groups: RowGroups, fixed: np.ndarray, owned: np.ndarray) -> FreeMotions:
+        """Return those on nodes on the owned rows of a system.
 
-    def met_anew(
-        self,
-        kept: sp.csr_matrix,
-        equality: int,
-        relations: Sequence[Measured],
-        further: sp.csr_matrix | None,
-        owned: np.ndarray,
-    ) -> FreeMotions:
+        Raises:
+            InvalidInputError: If in rows of ties and contacts nothing but rigid surfaces moves.
+        """
+        if self.count == 0:
+            return replace(self, columns=sp.csr_matrix((len(owned), 0)))
+        return replace(self, columns=without_held(groups.columns(self.columns), groups, fixed)[owned])
+
+    def with_unknowns(self, own: Unknowns, owned: np.ndarray) -> FreeMotions:
+        """Return those of the owned rows, with unknowns that groups of rows have of their own behind them."""
+        if not len(own.load):
+            return self
+        columns = sp.hstack([self.columns, own.columns[owned]], format="csr")
+        return replace(self, columns=columns, load=np.concatenate([self.load, own.load]))
+
+    def on_contact_rows(self, kept: sp.csr_matrix, groups: RowGroups, owned: np.ndarray) -> FreeMotions:
         """Return those of a system on the rows of other contact points.
 
-        `kept`: picks rows that stay, shape (n_owned, n_owned before); `equality`: number of these of all
-        ranks; `relations`: those of contact; `further`: columns of further rows on nodes, (n_nodes · dim, m).
+        `kept`: picks rows that stay, shape (n_owned, n_owned before); `groups`: all those of now.
         """
         columns = (kept @ self.columns).tocsr()
         if self.nodes is None:
             return replace(self, columns=columns)
-        parts = [sp.csr_matrix((equality, self.nodes.shape[1])), *_of_relations(self.nodes, relations)]
-        if further is not None:
-            parts.append(-further.T @ self.nodes)
+        later = (groups.normal, groups.slips, *groups.further)
+        parts = [sp.csr_matrix((groups.n_equality, self.nodes.shape[1]))]
+        parts += [each.columns(self.nodes) for each in later]
         rows, count = sp.vstack(parts, format="csr")[owned], self.tracked
         more = sp.hstack([rows[:, :count], sp.csr_matrix((len(owned), self.count - count))])
         dyads = (kept @ self.dyads + rows[:, count:]).tocsr()
@@ -87,7 +87,7 @@ class FreeMotions:
 
 
 def without_held(
-    columns: sp.csr_matrix, relations: Sequence[Measured], fixed: np.ndarray, rounding: float = 1e-6
+    columns: sp.csr_matrix, groups: RowGroups, fixed: np.ndarray, rounding: float = 1e-6
 ) -> sp.csr_matrix:
     """Return Q without friction rows that are left to normal ones, shape (n_rows, n).
 
@@ -96,20 +96,15 @@ def without_held(
 
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `rounding`: of rows that
     cancel, relative to the largest.
-
-    Raises:
-        InvalidInputError: If in rows of ties and contacts nothing but rigid surfaces moves.
     """
-    counts = [relation.count for relation in relations]
-    starts = columns.shape[0] - np.cumsum(counts[::-1])[::-1]
-    felt, least = np.ones(columns.shape[0]), rounding * abs(columns).max()
-    for relation, start in zip(relations, starts, strict=True):
-        held = np.flatnonzero(relation.held(fixed))
-        moved = columns[start + held]
-        if isinstance(relation, Relations) and relation.resting is not None:
+    moving, least = np.ones(columns.shape[0]), rounding * abs(columns).max()
+    for group in groups:
+        held = np.flatnonzero(group.held(fixed))
+        moved, rows = groups.within(group, columns)[held], groups.rows_of(group)[held]
+        if group is groups.slips:
             # The normal rows are those of −n.
-            share = sp.diags(relation.along_normals(fixed)[held])
-            moved = moved + share @ columns[starts[-2] + relation.which[held]]
+            share = sp.diags(groups.slips.along_normals(fixed)[held])
+            moved = moved + share @ groups.within(groups.normal, columns)[groups.slips.which[held]]
         touched = int(np.count_nonzero(abs(moved).max(axis=1).toarray() > least)) if len(held) else 0
         if touched:
             raise InvalidInputError(
@@ -117,28 +112,13 @@ def without_held(
                 "and the master is a rigid surface with free components: prescribe these, or leave the "
                 "slave free"
             )
-        felt[start + held] = 0.0
-    return (sp.diags(felt) @ columns).tocsr()
-
-
-def _of_relations(fields: sp.csr_matrix, relations: Sequence[Measured]) -> list[sp.csr_matrix]:
-    """Return by how much fields on nodes, (n_nodes · dim, k), close rows, shape (n_rows, k)."""
-    parts = []
-    for relation in relations:
-        dim = relation.components
-        modes = [column.toarray().reshape(-1, dim) for column in fields.T]
-        moved = [-relation.of_supports(mode) for mode in modes] if relation.count else []
-        parts.append(sp.csr_matrix(np.array(moved).reshape(fields.shape[1], relation.count).T))
-    return parts
+        moving[rows] = 0.0
+    return (sp.diags(moving) @ columns).tocsr()
 
 
 def _moving(columns: sp.csr_matrix, shape: tuple[int, ...]) -> np.ndarray:
     """Return which nodes rigid surfaces move, shape (n_nodes,)."""
     return np.asarray(np.asarray(abs(columns).sum(axis=1)).reshape(shape).any(axis=1))
-
-
-#: Of a scene without rigid surfaces that are free to move.
-NO_MOTIONS = FreeMotions(sp.csr_matrix((0, 0)), np.zeros(0))
 
 
 def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:

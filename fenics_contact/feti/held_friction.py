@@ -27,7 +27,8 @@ def even_friction(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
         return multiplier
     width, friction = torn.components - 1, torn.tangential_rows.ravel()
     normal, tau = (torn.numbering.gather(multiplier, part) for part in (torn.normal_rows, friction))
-    bound, size = torn.slip_bound(normal[torn.frictional]), np.linalg.norm(tau.reshape(-1, width), axis=1)
+    bound = torn.groups.slips.slip_bound(normal[torn.frictional])
+    size = np.linalg.norm(tau.reshape(-1, width), axis=1)
     rows = rows[(size < bound * (1.0 - HELD))[rows // width]]
     if len(rows) == 0:
         return multiplier
@@ -43,17 +44,16 @@ def even_friction(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
 
 def _held_rows(torn: TornSystem) -> np.ndarray:
     """Return the friction rows, by number, along which the slave is held and the master is not."""
-    slips, fixed = torn.relations[2], torn.decomposition.fixed
+    slips, fixed = torn.groups.slips, torn.decomposition.fixed
     own = free_part(slips.directions, torn.points.slave[slips.which], fixed, slips.axes)
     held = (np.linalg.norm(own, axis=1) <= HELD) & ~slips.held(fixed)
-    if torn.elastic_slip is not None:
-        held &= np.repeat(torn.elastic_slip == 0.0, torn.components - 1)
-    return np.flatnonzero(held)
+    stiff = np.repeat(slips.elastic_slip == 0.0, torn.components - 1)
+    return np.flatnonzero(held & stiff)
 
 
 def _on_nodes(torn: TornSystem, rows: np.ndarray) -> sp.csr_matrix:
     """Return friction rows on free components of nodes and free motions of rigid surfaces. Collective."""
-    slips, width = torn.relations[2], torn.components
+    slips, width = torn.groups.slips, torn.components
     row, node, weight, along = torn.points.entries(slips.which[rows], slips.directions[rows])
     value = weight[:, None] * free_part(along, node, torn.decomposition.fixed, slips.axes)
     entries = value.ravel(), (np.repeat(row, width), (width * node[:, None] + np.arange(width)).ravel())

@@ -8,7 +8,6 @@ from fenics_contact._base.display import counted
 from fenics_contact._pairing.points import HELD, ContactPoints
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti.contact_rows import Relations
 
 #: Penetration attributable to faceting, relative to the size of a slave facet.
 FACETING = 0.1
@@ -39,24 +38,16 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
 
 
 def gap_with_room(
-    normal: Relations,
-    fixed: np.ndarray,
-    prescribed: np.ndarray,
-    soft: np.ndarray | None = None,
-    slight: float = 0.02,
+    points: ContactPoints, freedom: np.ndarray, moved: np.ndarray, soft: np.ndarray, slight: float = 0.02
 ) -> np.ndarray:
     """Return the gaps; between surfaces held by supports, penetration due to faceting is removed.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `prescribed`: prescribed
-    components of all nodes, NaN where free, shape (n_nodes, dim); `soft`: marks of points that give way,
-    which may be pressed, shape (n_points,); `slight`: supports hold a point along its
-    normal if the free fraction is no larger than this: normals of facets are slightly tilted, and sliding
-    along that tilt does not open a gap.
+    `freedom`: free part of the normals, from 0 to 1, shape (n_points,); `moved`: by how much supports close
+    the gaps, shape (n_points,); `soft`: marks of points that give way, which may be pressed, shape
+    (n_points,); `slight`: supports hold a point along its normal if the free fraction is no larger than this:
+    normals of facets are slightly tilted, and sliding along that tilt does not open a gap.
     """
-    points = normal.points
-    missing = np.where(normal.freedom(fixed) <= slight, normal.of_supports(prescribed) - points.gap, 0.0)
-    if soft is not None:
-        missing[soft] = 0.0
+    missing = np.where((freedom <= slight) & ~soft, moved - points.gap, 0.0)
     # A given interference is meant: it must not vanish where nothing can yield.
     pressed = missing > np.where(points.given, HELD, 1.0) * _explained(points)
     if pressed.any():

@@ -24,6 +24,16 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact.feti.constraints import ConstraintRows, factored
 
 
+class PeriodicRows(ConstraintRows):
+    """Rows of linear constraints, which may move points of contacts and ties as others."""
+
+    def once(
+        self, points: ContactPoints, scene: Scene, prescribed: np.ndarray, *, areas: bool
+    ) -> ContactPoints:
+        """Return points without those that equations move as others."""
+        return once_at_periodic_edges(points, self, scene, prescribed, areas=areas)
+
+
 def once_at_periodic_edges(
     points: ContactPoints,
     constraints: ConstraintRows,
@@ -94,7 +104,7 @@ class _Across:
     @classmethod
     def of(cls, constraints: ConstraintRows, scene: Scene, prescribed: np.ndarray) -> _Across:
         """Factor the equations of a scene."""
-        right = constraints.right(scene.constraints) - constraints.of_supports(prescribed)
+        right = constraints.right(scene, prescribed) - constraints.of_supports(prescribed)
         factor = factored((constraints.free @ constraints.free.T).tocsr())
         return cls(constraints, factor, right, constraints.moved(prescribed))
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.display import counted
+from fenics_contact._base.sparse import scaled_columns
 from fenics_contact._pairing.points import (
     ContactPoints,
     NodeNumbers,
@@ -17,12 +19,124 @@ from fenics_contact._pairing.points import (
 )
 from fenics_contact._scene.local_axes import LocalAxes, free_part
 from fenics_contact._scene.scene import Scene
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti.contact_rows import Relations
-from fenics_contact.feti.free_motions import FreeMotions
+from fenics_contact.errors import InfeasibleError, InvalidInputError, together
+from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.row_groups import Unknowns
+from fenics_contact.feti.ties import BondedPoints, bonded_rows
 
 
-def section_points(
+@dataclass(frozen=True, eq=False)
+class SectionRows(BondedPoints):
+    """Rows of the nodes on both sides of sections, whose slaves lie behind them.
+
+    Attributes:
+        shortenings: What unit shortenings of all preloads are in the rows, shape (n_rows, n_preloads).
+    """
+
+    draws = True
+
+    shortenings: sp.csr_matrix
+
+    @classmethod
+    def key(cls, scene: Scene) -> Sequence[object]:
+        """Return where the sections are."""
+        return [preload.key for preload in scene.preloads]
+
+    @classmethod
+    def of(
+        cls, scene: Scene, decomposition: Decomposition, ties: ContactPoints, known: Sequence[SectionRows]
+    ) -> Sequence[SectionRows]:
+        """Return those of a scene with preloads. Collective."""
+        if not scene.preloads:
+            return ()
+        with together(decomposition.comm):
+            tearing, fixed, axes = decomposition.tearing, decomposition.fixed, decomposition.axes
+            points = _section_points(scene, ties, tearing, fixed, axes)
+        which, along = bonded_rows(points, decomposition)
+        value = -np.einsum("rd,rd->r", along, points.normal[which])
+        entries = value, (np.arange(len(which)), points.pair[which])
+        drawn = sp.csr_matrix(entries, shape=(len(which), len(scene.preloads)))
+        return (cls(points, which, along, drawn, axes=axes),)
+
+    def right(self, scene: Scene, prescribed: np.ndarray) -> np.ndarray:
+        """Return the given shortenings along the rows, shape (n_rows,), [length]."""
+        return np.asarray(self.shortenings @ given_shortenings(scene))
+
+    def unknowns(self, scene: Scene) -> Unknowns:
+        """Return the shortenings of preloads that have a force, in units of equal size over all nodes."""
+        free, size = _free(scene), shortening_scales(scene)
+        force = np.array([preload.force or 0.0 for preload in scene.preloads])
+        columns = scaled_columns(self.shortenings[:, free], 1.0 / size[free])
+        return Unknowns(columns, force[free] / size[free])
+
+    def once(
+        self, points: ContactPoints, scene: Scene, prescribed: np.ndarray, *, areas: bool
+    ) -> ContactPoints:
+        """Return the contact points, of two on both sides of a section one with the area of both."""
+        numbers = NodeNumbers.of(scene)
+        return _once_at_sections(points, scene, numbers) if areas else points
+
+    def lengths(self, jump: np.ndarray) -> np.ndarray:
+        """Return the shortening of each preload for values of B u, shape (n_preloads,), [length]."""
+        drawn = self.shortenings
+        return np.asarray((drawn.T @ jump) / np.asarray(drawn.power(2).sum(axis=0)).ravel())
+
+    def begun(
+        self, before: SectionRows, scene: Scene, jump: np.ndarray, multiplier: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the lengths of bolts that are held now, and the forces that were in those drawn now."""
+        free = _free(scene)
+        lengths, forces = before.lengths(jump), -np.asarray(before.shortenings.T @ multiplier)
+        lengths[free] = 0.0
+        crossed = np.diff(self.shortenings.indptr) > 0
+        right = np.where(crossed, self.shortenings @ lengths, np.nan)
+        return right, forces[free] / shortening_scales(scene)[free]
+
+    def released(self, scene: Scene) -> tuple[sp.csr_matrix, np.ndarray]:
+        """Return the normals over all nodes of sections that forces draw together, and these forces.
+
+        They transmit nothing else along their normals.
+        """
+        points, free, dim = self.points, _free(scene), self.components
+        scale = shortening_scales(scene)[free]
+        mine = np.flatnonzero(np.isin(points.pair, free))
+        column = np.searchsorted(free, points.pair[mine])
+        value = points.normal[mine] / scale[column, None]
+        row = dim * mine[:, None] + np.arange(dim)
+        entries = value.ravel(), (row.ravel(), np.repeat(column, dim))
+        forces = np.array([scene.preloads[number].force or 0.0 for number in free])
+        return sp.csr_matrix(entries, shape=(dim * points.count, len(free))), -forces / scale
+
+    def require_resisted(self, scene: Scene, moved: np.ndarray, least: float) -> None:
+        """Reject forces that draw parts together between which nothing resists."""
+        for number, way in zip(_free(scene), np.abs(moved), strict=True):
+            preload = scene.preloads[number]
+            if preload.force and way > least:
+                raise InfeasibleError(
+                    f"a preload must draw parts against each other, but that of body {preload.body!r} acts "
+                    f"against an open joint: nothing resists its force of {preload.force:g} between the "
+                    "parts on both sides of its section. Let head and nut, and what they clamp, have "
+                    "contacts or ties, or give a shortening in place of the force"
+                )
+
+
+def _free(scene: Scene) -> np.ndarray:
+    """Return the numbers of preloads whose shortening is unknown."""
+    return np.flatnonzero([preload.is_free for preload in scene.preloads])
+
+
+def given_shortenings(scene: Scene) -> np.ndarray:
+    """Return the prescribed shortenings, zero where a force is given and of bolts held as they were made."""
+    return np.array([preload.shortening or 0.0 for preload in scene.preloads])
+
+
+def shortening_scales(scene: Scene) -> np.ndarray:
+    """Return the sizes of unit shortenings over all nodes of each section, shape (n_preloads,)."""
+    counts = [each.count(scene.bodies[each.body].mesh) for each in scene.preloads]
+    return np.sqrt(np.array(counts, dtype=np.float64))
+
+
+def _section_points(
     scene: Scene,
     ties: ContactPoints,
     numbers: NodeNumbers,
@@ -30,9 +144,7 @@ def section_points(
     axes: LocalAxes | None = None,
     slight: float = 1e-9,
 ) -> ContactPoints:
-    """Return the nodes on both sides of all sections as tied points, whose pairs come after the scene's ties.
-
-    The slave lies behind the section.
+    """Return the nodes on both sides of all sections as tied points, whose slaves lie behind them.
 
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`; `slight`:
     part of a normal that supports may hold: those of planes of symmetry have rounding.
@@ -62,7 +174,7 @@ def section_points(
         master = sp.csr_matrix((np.ones(count), before, np.arange(count + 1)), shape=(count, numbers.n_nodes))
         nothing = np.zeros(count)
         points = ContactPoints(
-            np.full(count, len(scene.ties) + number), behind, master, normals, tangent_frames(normals),
+            np.full(count, number), behind, master, normals, tangent_frames(normals),
             nothing, nothing, np.full(count, -1), np.zeros((count, scene.components - 1)),
             reference_axes(normals), np.zeros(normals.shape, dtype=bool), nothing, np.ones(count, dtype=bool),
         )  # fmt: skip
@@ -70,43 +182,7 @@ def section_points(
     return join_points(found, scene.components, numbers.n_nodes)
 
 
-def shortening_columns(scene: Scene, tied: Relations) -> sp.csr_matrix:
-    """Return what unit shortenings are in the rows of ties, shape (n_tied_rows, n_preloads)."""
-    number = tied.points.pair[tied.which] - len(scene.ties)
-    row = np.flatnonzero((number >= 0) & (number < len(scene.preloads)))  # springs come after
-    normal = tied.points.normal[tied.which[row]]
-    value = -np.einsum("rd,rd->r", tied.directions[row], normal)
-    shape = (tied.count, len(scene.preloads))
-    return sp.csr_matrix((value, (row, number[row])), shape=shape)
-
-
-def given_shortenings(scene: Scene) -> np.ndarray:
-    """Return the prescribed shortenings, zero where a force is given and of bolts held as they were made."""
-    return np.array([preload.shortening or 0.0 for preload in scene.preloads])
-
-
-def with_shortenings(free: FreeMotions, scene: Scene, columns: sp.csr_matrix) -> FreeMotions:
-    """Return the free motions with the unknown shortenings behind them, scaled as these.
-
-    `columns`: `shortening_columns` on the owned rows, on others zero, shape (n_owned, n_preloads).
-    """
-    loose = [number for number, preload in enumerate(scene.preloads) if preload.is_free]
-    if not loose:
-        return free
-    size = shortening_scales(scene)[loose]
-    force = np.array([preload.force or 0.0 for preload in scene.preloads])[loose]
-    own = columns[:, loose] @ sp.diags(1.0 / size)
-    columns = sp.hstack([free.columns, own], format="csr")
-    return replace(free, columns=columns, load=np.concatenate([free.load, force / size]))
-
-
-def shortening_scales(scene: Scene) -> np.ndarray:
-    """Return the sizes of unit shortenings over all nodes of each section, shape (n_preloads,)."""
-    counts = [each.count(scene.bodies[each.body].mesh) for each in scene.preloads]
-    return np.sqrt(np.array(counts, dtype=np.float64))
-
-
-def once_at_sections(
+def _once_at_sections(
     points: ContactPoints, scene: Scene, numbers: NodeNumbers, across: float = 0.1
 ) -> ContactPoints:
     """Return the contact points, of two on both sides of a section one with the area of both.

@@ -6,67 +6,90 @@ operator of these rows is F + C: bodies stay as they are, with their kernels, an
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._pairing.following import means_on_masters
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers, tangent_frames
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.springs import mean_weights
-
-if TYPE_CHECKING:
-    from fenics_contact.feti.contact_rows import Relations
+from fenics_contact._scene.springs import Spring, mean_weights
+from fenics_contact.errors import together
+from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.ties import JoinedPoints
 
 
 @dataclass(frozen=True, eq=False)
-class SpringRows:
-    """The last rows of ties, replicated.
+class SpringRows(JoinedPoints):
+    """Rows of springs, each of which is a point.
 
     Attributes:
-        spring: Spring of each row, shape (n,).
-        directions: d, unit vectors, shape (n, components).
-        compliance: C, shape (n,), [length / force].
-        tension: N₀, shape (n,), [force].
+        stiffness: k, shape (n_rows,), [force / length].
+        tension: N₀, shape (n_rows,), [force].
     """
 
-    spring: np.ndarray
-    directions: np.ndarray
-    compliance: np.ndarray
+    balanced_as = "beds"
+    #: Springs of a scene that have such rows.
+    part: ClassVar[type[Spring]] = Spring
+
+    stiffness: np.ndarray
     tension: np.ndarray
 
     @classmethod
-    def of(cls, scene: Scene) -> SpringRows:
-        """Return those of a scene with springs."""
-        parts = [each.rows(scene) for each in scene.springs]
-        counts = [len(stiffness) for _, stiffness in parts]
+    def key(cls, scene: Scene) -> Sequence[Spring]:
+        """Return the springs."""
+        return [each for each in scene.springs if type(each) is cls.part]
+
+    @classmethod
+    def of(
+        cls, scene: Scene, decomposition: Decomposition, ties: ContactPoints, known: Sequence[SpringRows]
+    ) -> Sequence[SpringRows]:
+        """Return those of a scene with springs. Collective."""
+        springs = cls.key(scene)
+        if not springs:
+            return ()
+        with together(decomposition.comm):
+            ends = spring_points(springs, scene, decomposition.tearing)
+            if any(body.mesh.followers for body in scene.bodies.values()):
+                ends = means_on_masters(ends, scene)
+        parts = [each.rows(scene) for each in springs]
+        which = np.repeat(np.arange(len(parts)), [len(stiffness) for _, stiffness in parts])
         directions, stiffness = (np.concatenate(part) for part in zip(*parts, strict=True))
         directions = np.pad(directions, ((0, 0), (0, scene.components - scene.dim)))
-        tension = np.repeat([each.tension for each in scene.springs], counts)
-        return cls(np.repeat(np.arange(len(counts)), counts), directions, 1.0 / stiffness, tension)
+        tension = np.array([each.tension for each in springs])[which]
+        return (cls(ends, which, directions, stiffness, tension, axes=decomposition.axes),)
 
     @property
-    def count(self) -> int:
-        """Number of rows."""
-        return len(self.spring)
+    def compliance(self) -> np.ndarray:
+        """C, shape (n_rows,), [length / force]."""
+        return 1.0 / self.stiffness
 
-    @property
-    def right(self) -> np.ndarray:
-        """Right sides c, shape (n,), [length]."""
+    def right(self, scene: Scene, prescribed: np.ndarray) -> np.ndarray:
+        """Return −C N₀, shape (n_rows,), [length]."""
         return -self.compliance * self.tension
 
+    def held(self, fixed: np.ndarray) -> np.ndarray:
+        """Return which rows are left to supports: none, as forces act also where these determine them."""
+        return np.zeros(self.count, dtype=bool)
 
-def spring_points(scene: Scene, numbers: NodeNumbers) -> ContactPoints:
-    """Return a point for each spring whose slave less its master is ū₂ − ū₁, numbered after all sections.
+    def elongation(self, multiplier: np.ndarray) -> np.ndarray:
+        """Return d·(ū₂ − ū₁) under multipliers, shape (n_rows,), [length]."""
+        return np.asarray(self.compliance * (multiplier - self.tension))
+
+
+def spring_points(springs: Sequence[Spring], scene: Scene, numbers: NodeNumbers) -> ContactPoints:
+    """Return a point for each spring whose slave less its master is ū₂ − ū₁.
 
     The slave is a node of an end: its rank owns the rows. The rest of the mean counts as master.
     """
-    count, dim, n_nodes = len(scene.springs), scene.components, numbers.n_nodes
+    count, dim, n_nodes = len(springs), scene.components, numbers.n_nodes
     entries: list[tuple[np.ndarray, ...]] = []
     slaves = np.zeros(count, dtype=np.int64)
-    for number, spring in enumerate(scene.springs):
+    for number, spring in enumerate(springs):
         for end, sign in ((spring.first, 1.0), (spring.second, -1.0)):
             if isinstance(end, Surface):
                 own, weights = mean_weights(scene, end)
@@ -76,22 +99,10 @@ def spring_points(scene: Scene, numbers: NodeNumbers) -> ContactPoints:
     entries.append((np.ones(count), np.arange(count), slaves))
     value, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
     master = sp.csr_matrix((value, (row, column)), shape=(count, n_nodes))
-    first, nothing = len(scene.ties) + len(scene.preloads), np.zeros(count)
+    nothing = np.zeros(count)
     normals = np.tile(np.eye(dim)[0], (count, 1))
     return ContactPoints(
-        first + np.arange(count), slaves, master, normals, tangent_frames(normals), nothing, nothing,
+        np.arange(count), slaves, master, normals, tangent_frames(normals), nothing, nothing,
         np.full(count, -1), np.zeros((count, dim - 1)), np.tile(np.eye(dim)[1], (count, 1)),
         np.zeros((count, dim), dtype=bool), nothing, np.ones(count, dtype=bool),
     )  # fmt: skip
-
-
-def with_springs(tied: Relations, springs: SpringRows) -> Relations:
-    """Return the rows of ties and sections, and behind them those of springs, whose points are the last."""
-    first = tied.points.count - int(springs.spring[-1]) - 1
-    kept = tied.which < first
-    return replace(
-        tied,
-        which=np.concatenate([tied.which[kept], first + springs.spring]),
-        directions=np.concatenate([tied.directions[kept], springs.directions]),
-        sprung=springs.count,
-    )

@@ -16,11 +16,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._fem.loads import as_tractions
 from fenics_contact._pairing.points import (
     ContactPoints,
-    closures_of,
-    elastic_slip,
-    friction_data,
     join_points,
-    reach_of,
     shared_once,
     tied_once,
     without_tied,
@@ -30,32 +26,22 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.true_shapes import is_approximate
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import safe_log
+from fenics_contact.feti.all_rows import RowGroups
 from fenics_contact.feti.averages import nodal_mean_at
-from fenics_contact.feti.constraints import ConstraintRows, constraint_rows
-from fenics_contact.feti.contact_rows import Relations, normal_relations, tangential_relations, tied_relations
-from fenics_contact.feti.decomposition import (
-    Decomposition,
-    DualNumbering,
-    Rows,
-    prescribed_along,
-    stack,
-)
-from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, Measured, free_motions, without_held
-from fenics_contact.feti.initial_gaps import check_no_penetration, gap_with_room
-from fenics_contact.feti.preloads import (
-    given_shortenings,
-    once_at_sections,
-    section_points,
-    shortening_columns,
-    with_shortenings,
-)
-from fenics_contact.feti.springs import SpringRows, spring_points, with_springs
+from fenics_contact.feti.compliance import RowCompliance
+from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
+from fenics_contact.feti.decomposition import Decomposition, DualNumbering, prescribed_along, stack
+from fenics_contact.feti.free_motions import FreeMotions, free_motions
+from fenics_contact.feti.initial_gaps import check_no_penetration
+from fenics_contact.feti.joints import JOINTS
+from fenics_contact.feti.row_groups import Glued, Joint, RowGroup
 from fenics_contact.feti.subdomain import Assembled, Subdomain, assemble
-from fenics_contact.qp.cones import CoulombLaw, SlipLaw, Strengths, TrescaLaw
+from fenics_contact.feti.ties import TieRows
+from fenics_contact.qp.cones import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 
 if TYPE_CHECKING:
-    from fenics_contact.qp.compliance import Closures, Compliance
+    from fenics_contact.qp.compliance import Compliance
 
 
 def meeting_points(
@@ -84,19 +70,6 @@ def meeting_points(
             points = without_tied(points, ties, scene, fixed, axes, told=told or comm.rank > 0)
     if len(scene.contacts) > 1:
         points = shared_once(points, scene, told=told or comm.rank > 0)
-    if scene.preloads:
-        with together(comm):
-            points = once_at_sections(points, scene, tearing)
-            sections = section_points(scene, ties, tearing, fixed, axes)
-        ties = join_points([ties, sections], scene.components, tearing.n_nodes)
-    if scene.springs:
-        with together(comm):
-            ends = spring_points(scene, tearing)
-            if any(body.mesh.followers for body in scene.bodies.values()):
-                from fenics_contact._pairing.following import means_on_masters
-
-                ends = means_on_masters(ends, scene)
-        ties = join_points([ties, ends], scene.components, tearing.n_nodes)
     return points, ties
 
 
@@ -131,61 +104,37 @@ class FluidLoad:
 class TornSystem:
     """min ½ uᵀK u − fᵀu + Σ Ψ_i ‖T_i u‖ subject to B_E u = c_E, B_N u ≤ c_N, distributed over ranks.
 
-    Rows of B are numbered: gluing and Dirichlet rows, rows of ties, normal rows (one per contact point),
-    tangential rows (dim − 1 per frictional point).
+    Rows of B are those of its groups, one group after the other: gluing and Dirichlet rows, joints, normal
+    rows (one per contact point), tangential rows (dim − 1 per frictional point).
 
     Attributes:
         scene: The scene with the geometry of this system.
         decomposition: The part that does not depend on the geometry.
         subdomains: This rank's subdomains with their matrices.
-        points: Contact points, replicated.
-        ties: Points of the ties, replicated.
-        n_equality: Number of gluing, Dirichlet and tie rows of all ranks.
-        frictional: Numbers of the contact points with friction, replicated, shape (n_friction,).
-        friction_coefficient: μ of each frictional point (zero under Tresca), replicated, shape (n_friction,).
-        tresca_bound: Fixed slip bound of each frictional point, replicated, shape (n_friction,), [force].
-        strengths: Slip bounds with limits or on curves in place of μ λ_N, whose μ is then the largest ratio,
-            replicated; None where there are none.
-        closures: Closures of the contact points under their forces, replicated; None where contact is exact.
-        elastic_slip: Slip of sticking points per friction force, replicated, shape (n_friction,), [length /
-            force]; None where there is none.
+        groups: What the rows are, replicated.
         numbering: Owners and exchange of multipliers.
-        relations: The relative displacements in the rows of ties and contacts, in their order, replicated.
-        B: This rank's part of B, shape (n_local_rows, torn_size); rows of ties and contacts act on free
+        B: This rank's part of B, shape (n_local_rows, torn_size); rows of joints and contacts act on free
             components only.
-        supported: Contribution of prescribed displacements to the owned rows of ties and contacts, shape
+        supported: Contribution of prescribed displacements to the owned rows of joints and contacts, shape
             (n_owned,), zero on other rows, [length].
         right: c of the owned rows less the contribution of supports, shape (n_owned,), [length].
         slid: Tangential displacement of the points without friction, which have no such rows, at the origin
             of slip, replicated, shape (n_contact − n_friction, dim − 1), [length].
+        free: The free motions of rigid surfaces and unknowns of joints, which add Q q to c.
         fluid: Load and place of fluid between surfaces; None without any.
-        springs: Springs between surfaces, the last rows of ties; None without any.
-        constraints: Linear constraints, whose rows come after those of ties; None without any.
-        free: The free motions of rigid surfaces and unknown shortenings of preloads, which add Q q to c.
     """
 
     scene: Scene
     decomposition: Decomposition
     subdomains: tuple[Subdomain, ...]
-    points: ContactPoints
-    ties: ContactPoints
-    n_equality: int
-    frictional: np.ndarray
-    friction_coefficient: np.ndarray
-    tresca_bound: np.ndarray
-    strengths: Strengths | None
-    closures: Closures | None
-    elastic_slip: np.ndarray | None
+    groups: RowGroups
     numbering: DualNumbering
-    relations: tuple[Relations, ...]
     B: sp.csr_matrix
     supported: np.ndarray
     right: np.ndarray
     slid: np.ndarray
     free: FreeMotions
     fluid: FluidLoad | None = None
-    springs: SpringRows | None = None
-    constraints: ConstraintRows | None = None
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
@@ -211,8 +160,7 @@ class TornSystem:
         first, moved = self.free.tracked, np.zeros(self.free.count)
         if self.free.count == first:
             return moved
-        # Sections lie in the last rows of ties that do not give way.
-        rows = self.numbering.owned < (self.first_sprung if self.scene.preloads else self.n_gluing)
+        rows = self.groups.marks(self.groups.fitted)[self.numbering.owned]
         columns = self.free.columns[rows][:, first:]
         sums = np.column_stack([(columns.T @ columns).toarray(), -columns.T @ residual[rows]])
         sums = self.decomposition.comm.allreduce(sums)
@@ -252,7 +200,7 @@ class TornSystem:
         `displacement`: torn, of this rank, shape (torn_size,), [length]; `multiplier`: λ, owned. Rows of
         points that are known to stick are marked, owned.
         """
-        relative, compliance = self.relative(displacement), self.compliance
+        relative, compliance = self.relative(displacement), self.compliance.contact
         if compliance is not None:
             relative = relative - compliance.given_way(multiplier)
         return np.where(sticks, self.right + self.supported, relative), self.sliding(displacement)
@@ -264,23 +212,9 @@ class TornSystem:
             relative: Its value of `relative`, owned, shape (n_owned,), [length].
             slid: Its value of `sliding`, replicated, shape (n_contact − n_friction, dim − 1), [length].
         """
-        tangential = self.numbering.owned >= self.n_equality + self.points.count
-        right = np.where(tangential, relative - self.supported, self.right)
+        marks = self.groups.marks([each for each in self.groups if each.from_before])
+        right = np.where(marks[self.numbering.owned], relative - self.supported, self.right)
         return replace(self, right=right, slid=slid)
-
-    def of_ties(self, columns: sp.csr_matrix) -> sp.csr_matrix:
-        """Return the owned rows of a matrix with a row for each row of ties, zero on other rows."""
-        rows = self.numbering.owned - self.n_gluing
-        here = (rows >= 0) & (rows < columns.shape[0])
-        chosen = sp.csr_matrix(
-            (np.ones(here.sum()), (np.flatnonzero(here), rows[here])), shape=(len(rows), columns.shape[0])
-        )
-        return (chosen @ columns).tocsr()
-
-    @property
-    def frictionless(self) -> np.ndarray:
-        """Numbers of the contact points without friction, shape (n_contact − n_friction,)."""
-        return np.setdiff1d(np.arange(self.points.count), self.frictional, assume_unique=True)
 
     def gluing_of(self, force: np.ndarray) -> np.ndarray:
         """Return multipliers of gluing rows that take a force as well as rows do one by one. Collective.
@@ -295,12 +229,9 @@ class TornSystem:
 
     def moved_further(self, change: np.ndarray) -> TornSystem:
         """Return a system whose supports have moved, (n_nodes, dim), along axes of nodes, 0 where free."""
-        supported = np.concatenate([relation.of_supports(change) for relation in self.measured])
-        supported = np.concatenate([np.zeros(self.n_gluing), supported])
-        right = -supported
-        right[: self.n_gluing] = change.ravel()[self.decomposition.gluing.dof]
         owned = self.numbering.owned
-        return replace(self, right=self.right + right[owned], supported=self.supported + supported[owned])
+        right = self.right + self.groups.driven(change)[owned]
+        return replace(self, right=right, supported=self.supported + self.groups.of_supports(change)[owned])
 
     def sliding(self, displacement: np.ndarray) -> np.ndarray:
         """Return the tangential displacement of points without friction, [length]. Collective.
@@ -311,20 +242,11 @@ class TornSystem:
         Returns:
             Shape (n_contact − n_friction, dim − 1), replicated.
         """
-        chosen = self.frictionless
+        chosen = self.groups.slips.frictionless
         jump = self.points.jump[chosen]
         nodes = np.unique(jump.indices)
         relative = jump[:, nodes] @ nodal_mean_at(self.decomposition, displacement, nodes)
         return np.asarray(np.einsum("nad,nd->na", self.points.tangents[chosen], relative))
-
-    def driven_as(self, prescribed: np.ndarray) -> bool:
-        """Return whether supports drive the same frictional points as in this system.
-
-        Args:
-            prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
-        """
-        rows = self.relations[2]
-        return rows.resting is not None and np.array_equal(rows.of_supports(prescribed) == 0.0, rows.resting)
 
     def finer_gap(self) -> np.ndarray:
         """Return the gaps between surfaces known better than those used, see `true_surface`. Collective.
@@ -349,10 +271,10 @@ class TornSystem:
 
     def with_gap(self, gap: np.ndarray) -> TornSystem:
         """Return the system with other gaps, shape (n_contact,), [length]."""
-        change = np.zeros(int(self.n_equality + self.points.count + self.tangential_rows.size))
+        change = np.zeros(self.groups.total)
         change[self.normal_rows] = gap - self.points.gap
-        points = replace(self.points, gap=gap)
-        return replace(self, points=points, right=self.right + change[self.numbering.owned])
+        groups = self.groups.with_points(replace(self.points, gap=gap))
+        return replace(self, groups=groups, right=self.right + change[self.numbering.owned])
 
     @property
     def components(self) -> int:
@@ -360,46 +282,49 @@ class TornSystem:
         return self.decomposition.tearing.components
 
     @property
+    def points(self) -> ContactPoints:
+        """The contact points, replicated."""
+        return self.groups.normal.points
+
+    @property
+    def tie_rows(self) -> tuple[TieRows, ...]:
+        """The rows of the scene's ties."""
+        return tuple(each for each in self.groups.joints if isinstance(each, TieRows))
+
+    @property
+    def ties(self) -> ContactPoints:
+        """The points of the scene's ties in the order of `tie_rows`, replicated."""
+        parts = [each.points for each in self.tie_rows]
+        return join_points(parts, self.components, self.decomposition.tearing.n_nodes)
+
+    @property
+    def frictional(self) -> np.ndarray:
+        """Numbers of the contact points with friction, replicated, shape (n_friction,)."""
+        return self.groups.slips.frictional
+
+    @property
     def n_gluing(self) -> int:
         """Number of gluing and Dirichlet rows of all ranks."""
-        return self.decomposition.gluing.rows.count
+        return self.groups.glued.count
 
     @property
-    def first_sprung(self) -> int:
-        """Number of the first row of springs."""
-        return self.after_ties - (0 if self.springs is None else self.springs.count)
-
-    @property
-    def after_ties(self) -> int:
-        """Number of the first row of constraints, behind those of ties, sections and springs."""
-        return self.n_gluing + self.relations[0].count
-
-    @property
-    def measured(self) -> tuple[Measured, ...]:
-        """What all rows but gluing ones measure, in their order."""
-        tied, normal, slips = self.relations
-        return (tied, *(() if self.constraints is None else (self.constraints,)), normal, slips)
-
-    @cached_property
-    def give(self) -> np.ndarray | None:
-        """C of rows of springs, zero on others, owned, (n_owned,), [length / force]; None without any."""
-        if self.springs is None:
-            return None
-        result = np.zeros(len(self.numbering.owned))
-        place = self.numbering.owned_index(np.arange(self.first_sprung, self.after_ties))
-        result[place[place >= 0]] = self.springs.compliance[place >= 0]
-        return result
+    def n_equality(self) -> int:
+        """Number of gluing, Dirichlet and joint rows of all ranks."""
+        return self.groups.n_equality
 
     @property
     def normal_rows(self) -> np.ndarray:
         """Row number of every contact point's normal multiplier, shape (n_contact,)."""
-        return self.n_equality + np.arange(self.points.count)
+        return self.groups.rows_of(self.groups.normal)
 
     @property
     def tangential_rows(self) -> np.ndarray:
         """Row numbers of every frictional point's tangential multipliers, shape (n_friction, dim - 1)."""
-        start, width = self.n_equality + self.points.count, self.components - 1
-        return start + np.arange(width * len(self.frictional)).reshape(-1, width)
+        return self.groups.rows_of(self.groups.slips).reshape(-1, self.components - 1)
+
+    def gathered(self, multiplier: np.ndarray, group: RowGroup) -> np.ndarray:
+        """Return the entries of an owned vector in the rows of a group, on every rank. Collective."""
+        return self.numbering.gather(multiplier, self.groups.rows_of(group))
 
     @cached_property
     def layout(self) -> ContactLayout:
@@ -417,34 +342,34 @@ class TornSystem:
     @property
     def law(self) -> SlipLaw:
         """The law of friction of this rank's discs."""
-        discs, layout, coefficient = self.owned_discs, self.layout, self.friction_coefficient
-        if not np.any(coefficient > 0):
-            return TrescaLaw(layout, self.tresca_bound[discs])
-        strengths = None if self.strengths is None else self.strengths.part(discs)
-        return CoulombLaw(layout, coefficient[discs], self.tresca_bound[discs], strengths)
+        discs, layout, slips = self.owned_discs, self.layout, self.groups.slips
+        if not np.any(slips.coefficient > 0):
+            return TrescaLaw(layout, slips.tresca_bound[discs])
+        strengths = None if slips.strengths is None else slips.strengths.part(discs)
+        return CoulombLaw(layout, slips.coefficient[discs], slips.tresca_bound[discs], strengths)
+
+    @cached_property
+    def compliance(self) -> RowCompliance:
+        """By how much this rank's rows give way."""
+        constant = self.groups.compliance[self.numbering.owned]
+        soft = np.flatnonzero(constant)
+        return RowCompliance(soft, constant[soft], self._compliance_of_contact)
 
     @property
-    def compliance(self) -> Compliance | None:
-        """By how much this rank's contact rows give way; None where none does."""
-        if self.closures is None and self.elastic_slip is None:
+    def _compliance_of_contact(self) -> Compliance | None:
+        normal, slips = self.groups.normal, self.groups.slips
+        if normal.closures is None and not slips.is_elastic:
             return None
         from fenics_contact.qp.compliance import Closures, Compliance  # of no use in exact contact
 
-        owned, discs = self.numbering.owned_index(self.normal_rows) >= 0, self.owned_discs
-        closures = self.closures or Closures.exact(self.points.area)
-        slip = np.zeros(len(discs)) if self.elastic_slip is None else self.elastic_slip[discs]
-        return Compliance(self.layout, closures.part(owned), slip)
+        owned = self.numbering.owned_index(self.normal_rows) >= 0
+        closures = normal.closures or Closures.exact(self.points.area)
+        return Compliance(self.layout, closures.part(owned), slips.elastic_slip[self.owned_discs])
 
     @property
     def reach(self) -> np.ndarray | float:
         """Distances of the contact points at which pressure begins, shape (n_contact,); zero by default."""
-        return 0.0 if self.closures is None else reach_of(self.scene, self.points)
-
-    def slip_bound(self, normal_force: np.ndarray) -> np.ndarray:
-        """Return Ψ at normal forces of the frictional points, shape (n_friction,), [force]."""
-        if self.strengths is not None:
-            return self.tresca_bound + self.strengths.bound(normal_force)
-        return np.asarray(self.tresca_bound + self.friction_coefficient * np.maximum(normal_force, 0))
+        return self.groups.normal.reach(self.scene)
 
     @property
     def load(self) -> np.ndarray:
@@ -504,13 +429,12 @@ def build_torn_system(
     with together(comm):
         prescribed, _ = prescribed_along(scene, decomposition.tearing)
         free = free_motions(scene, decomposition.tearing)
-    alike = previous if previous is not None and _meets_alike(scene, decomposition, previous) else None
-    if alike is not None and alike.driven_as(prescribed):
+    if previous is not None and _is_alike(scene, decomposition, previous, prescribed):
         # Only loads and prescribed values changed: B stays the same object, which marks F as unchanged, too.
-        system = replace(alike, scene=scene, subdomains=subdomains, fluid=None)
-    else:
-        system = _joined(scene, decomposition, subdomains, overlap, previous, prescribed)
-    return _with_right_sides(system, prescribed, free)
+        return _at_rest(scene, decomposition, subdomains, previous, prescribed, free)
+    groups = _found(scene, decomposition, overlap, previous, prescribed)
+    rows = _numbered(groups, decomposition, None if previous is None else previous.numbering)
+    return _at_rest(scene, decomposition, subdomains, rows, prescribed, free)
 
 
 def with_points(torn: TornSystem, points: ContactPoints) -> TornSystem:
@@ -519,11 +443,10 @@ def with_points(torn: TornSystem, points: ContactPoints) -> TornSystem:
         return torn
     scene, decomposition = torn.scene, torn.decomposition
     prescribed, _ = prescribed_along(scene, decomposition.tearing)
-    system = _with_rows(
-        scene, decomposition, torn.subdomains, (points, torn.ties), torn.numbering, prescribed,
-        constraints=torn.constraints,
-    )  # fmt: skip
-    return _with_right_sides(system, prescribed, free_motions(scene, decomposition.tearing))
+    groups = _with_contact(scene, decomposition, torn.groups.joints, points, prescribed)
+    rows = _numbered(groups, decomposition, torn.numbering)
+    free = free_motions(scene, decomposition.tearing)
+    return _at_rest(scene, decomposition, torn.subdomains, rows, prescribed, free)
 
 
 def with_points_inside(torn: TornSystem, other: TornSystem) -> TornSystem:
@@ -531,48 +454,49 @@ def with_points_inside(torn: TornSystem, other: TornSystem) -> TornSystem:
     return torn if other.points.are_at_nodes else with_points(torn, other.points)
 
 
-def _with_right_sides(system: TornSystem, prescribed: np.ndarray, free: FreeMotions) -> TornSystem:
-    """Return a system with what its rows measure at rest and under supports. Collective."""
-    scene, decomposition, comm = system.scene, system.decomposition, system.decomposition.comm
-    glued = decomposition.gluing.right_side(prescribed, decomposition.axes)
+@dataclass(frozen=True, eq=False)
+class NumberedRows:
+    """Groups of rows, numbered over ranks, with this rank's part of B; see `TornSystem`."""
+
+    groups: RowGroups
+    numbering: DualNumbering
+    B: sp.csr_matrix
+
+
+def _at_rest(
+    scene: Scene,
+    decomposition: Decomposition,
+    subdomains: tuple[Subdomain, ...],
+    rows: NumberedRows | TornSystem,
+    prescribed: np.ndarray,
+    free: FreeMotions,
+) -> TornSystem:
+    """Return the system with what its rows measure at rest and under supports. Collective.
+
+    `free`: those on nodes.
+    """
+    groups, owned, comm = rows.groups, rows.numbering.owned, decomposition.comm
     with together(comm):
-        soft = None if system.closures is None else system.closures.curve >= 0
-        gap = gap_with_room(system.relations[1], decomposition.fixed, prescribed, soft) - system.reach
-    supported = np.concatenate([relation.of_supports(prescribed) for relation in system.measured])
-    tied, slip = np.zeros(system.relations[0].count), np.zeros(system.tangential_rows.size)
-    supported = np.concatenate([np.zeros(len(glued)), supported])
-    owned = system.numbering.owned
-    if scene.preloads:
-        drawn = shortening_columns(scene, system.relations[0])
-        tied = drawn @ given_shortenings(scene)
-    if system.springs is not None:
-        tied[len(tied) - system.springs.count :] = system.springs.right
-    if system.constraints is not None:
-        with together(comm):
-            system.constraints.require_consistent(scene.constraints, prescribed, free.columns)
-        tied = np.concatenate([tied, system.constraints.right(scene.constraints)])
-    right = np.concatenate([glued, tied, gap, slip]) - supported
-    slid = np.zeros((len(system.frictionless), system.components - 1))
-    if free.count:
-        columns = free.of_rows(decomposition.gluing.dof, system.measured)
-        with together(comm):
-            columns = without_held(columns, system.measured, decomposition.fixed)
-        free = replace(free, columns=columns[owned])
-    else:
-        free = replace(free, columns=sp.csr_matrix((len(owned), 0)))
-    if scene.preloads:
-        free = with_shortenings(free, scene, system.of_ties(drawn))
-    return replace(system, supported=supported[owned], right=right[owned], slid=slid, free=free)
+        right = np.concatenate([group.right(scene, prescribed) for group in groups])
+        for joint in groups.joints:
+            joint.check(scene, prescribed, free.columns)
+        free = free.on_rows(groups, decomposition.fixed, owned)
+    supported = groups.of_supports(prescribed)
+    return TornSystem(
+        scene, decomposition, subdomains, groups, rows.numbering, rows.B, supported[owned],
+        (right - supported)[owned], np.zeros((len(groups.slips.frictionless), scene.components - 1)),
+        free.with_unknowns(groups.unknowns(scene), owned),
+    )  # fmt: skip
 
 
-def _meets_alike(scene: Scene, decomposition: Decomposition, known: TornSystem) -> bool:
-    """Return whether two scenes have the same meshes, pairs and held components, whatever fluid is there."""
-    rest = [
-        [*each.ties, *each.springs, *(c.key for c in each.constraints), *(p.key for p in each.preloads)]
-        for each in (scene, known.scene)
-    ]
+def _is_alike(
+    scene: Scene, decomposition: Decomposition, known: TornSystem, prescribed: np.ndarray
+) -> bool:
+    """Return whether scenes have the same meshes, pairs and held components, and supports drive the same."""
     same = scene.has_meshes_of(known.scene) and known.decomposition is decomposition
-    return same and known.points.are_at_nodes and rest[0] == rest[1] and contacts_alike(scene, known.scene)
+    same = same and known.points.are_at_nodes and contacts_alike(scene, known.scene)
+    same = same and all(list(kind.key(scene)) == list(kind.key(known.scene)) for kind in JOINTS)
+    return same and known.groups.slips.driven_as(prescribed)
 
 
 def contacts_alike(scene: Scene, other: Scene) -> bool:
@@ -583,111 +507,91 @@ def contacts_alike(scene: Scene, other: Scene) -> bool:
     return pairs[0] == pairs[1]
 
 
-def _joined(
+def _found(
     scene: Scene,
     decomposition: Decomposition,
-    subdomains: tuple[Subdomain, ...],
     overlap: bool,
     previous: TornSystem | None,
     prescribed: np.ndarray,
-) -> TornSystem:
-    """Search for contact and build B; the right side is left empty. Collective."""
+) -> RowGroups:
+    """Search for contact, and return all groups of rows. Collective."""
     told = previous is not None and previous.scene.has_surfaces_of(scene)
-    met = meeting_points(scene, decomposition, overlap=overlap, told=told)
-    known = None if previous is None else previous.numbering
-    kept = constraint_rows(scene, decomposition, None if previous is None else previous.constraints)
-    if kept is not None:
-        from fenics_contact.feti.periodic import once_at_periodic_edges
-
-        with together(decomposition.comm):
-            points, ties = met
-            ties = once_at_periodic_edges(ties, kept, scene, prescribed, areas=False)
-            met = once_at_periodic_edges(points, kept, scene, prescribed), ties
-    system = _with_rows(scene, decomposition, subdomains, met, known, prescribed, constraints=kept)
+    points, ties = meeting_points(scene, decomposition, overlap=overlap, told=told)
+    found = _joints(scene, decomposition, ties, () if previous is None else previous.groups.joints)
+    with together(decomposition.comm):
+        left = ties
+        for joint in found:
+            left = joint.once(left, scene, prescribed, areas=False)
+            points = joint.once(points, scene, prescribed, areas=True)
+    if left is not ties:
+        found = _joints(scene, decomposition, left, found)
+    groups = _with_contact(scene, decomposition, found, points, prescribed)
     if decomposition.comm.rank == 0:
-        _log_held(system.relations[2], decomposition.fixed)
-    return system
+        _log_held(groups.slips, decomposition.fixed)
+    return groups
 
 
-def meeting_at(
-    torn: TornSystem,
+def _joints(
+    scene: Scene, decomposition: Decomposition, ties: ContactPoints, known: Sequence[Joint]
+) -> tuple[Joint, ...]:
+    """Return the joints of a scene in the order of their rows, given those of an earlier one. Collective."""
+    found: list[Joint] = []
+    for kind in JOINTS:
+        found += kind.of(scene, decomposition, ties, [each for each in known if isinstance(each, kind)])
+    return tuple(found)
+
+
+def _with_contact(
+    scene: Scene,
+    decomposition: Decomposition,
+    joints: tuple[Joint, ...],
     points: ContactPoints,
     prescribed: np.ndarray,
-    further: Sequence[tuple[Rows, sp.csr_matrix]] = (),
+    further: tuple[RowGroup, ...] = (),
+) -> RowGroups:
+    """Return all groups of rows at contact points. Collective."""
+    axes, glued = decomposition.axes, Glued(decomposition.gluing)
+    normal = NormalRows.of(scene, points, axes)
+    slips = TangentialRows.of(scene, points, prescribed, decomposition.comm, axes)
+    return RowGroups(glued, joints, normal, slips, further)
+
+
+def on_contact_rows(
+    torn: TornSystem, points: ContactPoints, prescribed: np.ndarray, further: tuple[RowGroup, ...] = ()
 ) -> TornSystem:
     """Return a system with other contact points, those of bodies that have moved. Collective.
 
     `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim); `further`: rows
-    after all others, with their columns on all components of nodes, shape (n_nodes · dim, n).
+    after all others.
     """
-    ties, known = torn.ties, torn.numbering
-    system = _with_rows(
-        torn.scene, torn.decomposition, torn.subdomains, (points, ties), known, prescribed,
-        [rows for rows, _ in further], torn.constraints,
-    )  # fmt: skip
-    owned = system.numbering.owned
-    right, supported = np.zeros((2, len(owned)))
-    equality = owned < torn.n_equality  # each rank owns the same of these
-    right[equality] = torn.right[torn.numbering.owned < torn.n_equality]
-    supported[equality] = torn.supported[torn.numbering.owned < torn.n_equality]
-    normal = (owned >= torn.n_equality) & (owned < torn.n_equality + points.count)
-    right[normal] = points.gap[owned[normal] - torn.n_equality]
-    slid = np.zeros((len(system.frictionless), system.components - 1))
-    there = np.flatnonzero(torn.numbering.owned < torn.n_equality)
-    entries = np.ones(len(there)), (np.flatnonzero(equality), there)
-    rows = sp.csr_matrix(entries, shape=(len(owned), len(torn.numbering.owned)))
-    columns = sp.hstack([each for _, each in further], format="csr") if further else None
-    free = torn.free.met_anew(rows, torn.n_equality, system.relations[1:], columns, owned)
-    return replace(system, right=right, supported=supported, slid=slid, free=free)
-
-
-def _with_rows(
-    scene: Scene,
-    decomposition: Decomposition,
-    subdomains: tuple[Subdomain, ...],
-    met: tuple[ContactPoints, ContactPoints],
-    known: DualNumbering | None,
-    prescribed: np.ndarray,
-    further: Sequence[Rows] = (),
-    constraints: ConstraintRows | None = None,
-) -> TornSystem:
-    """Build B for contact points and tied ones; the right side is left empty. Collective."""
-    points, ties = met
-    has_friction, coefficient, tresca, strengths = friction_data(scene, points, decomposition.comm)
-    frictional, elastic = np.flatnonzero(has_friction), elastic_slip(scene, points)
-    gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
-    axes = decomposition.axes
-    tied = tied_relations(ties, scene.ties, fixed, axes)
-    springs = SpringRows.of(scene) if scene.springs else None
-    tied = tied if springs is None else with_springs(tied, springs)
-    slips = tangential_relations(points, frictional, prescribed, axes)
-    relations = (tied, normal_relations(points, axes), slips)
-    parts = [relation.rows(tearing, fixed) for relation in relations]
-    parts[1:1] = [] if constraints is None else [constraints.rows(tearing)]
-    equality = sum(part.count for part in (gluing, *parts[:-2]))
-    rows = stack([gluing, *parts, *further])
-    numbering, B = _own_part(rows, decomposition, known)
+    scene, decomposition = torn.scene, torn.decomposition
+    groups = _with_contact(scene, decomposition, torn.groups.joints, points, prescribed, further)
+    rows = _numbered(groups, decomposition, torn.numbering)
+    owned, before = rows.numbering.owned, torn.numbering.owned
+    # Each rank owns the same rows of equality.
+    equality, kept = (np.flatnonzero(each < torn.n_equality) for each in (owned, before))
+    picked = sp.csr_matrix((np.ones(len(kept)), (equality, kept)), shape=(len(owned), len(before)))
+    right = np.zeros(groups.total)
+    right[groups.rows_of(groups.normal)] = points.gap
+    right = right[owned]
+    right[equality] = torn.right[kept]
+    slid = np.zeros((len(groups.slips.frictionless), scene.components - 1))
     return TornSystem(
-        scene, decomposition, subdomains, points, ties, equality, frictional,
-        coefficient[frictional], tresca[frictional],
-        None if strengths is None else strengths.part(frictional), closures_of(scene, points),
-        None if elastic is None else elastic[frictional], numbering, relations, B,
-        np.zeros(0), np.zeros(0), np.zeros((0, scene.components - 1)), NO_MOTIONS, springs=springs,
-        constraints=constraints,
+        scene, decomposition, torn.subdomains, groups, rows.numbering, rows.B, picked @ torn.supported, right,
+        slid, torn.free.on_contact_rows(picked, groups, owned),
     )  # fmt: skip
 
 
-def _log_held(rows: Relations, fixed: np.ndarray) -> None:
+def _log_held(rows: TangentialRows, fixed: np.ndarray) -> None:
     held = int(rows.held(fixed).sum())
     if held:
         words = "%d of %d friction rows are left to the supports, which hold slip there"
         safe_log(_LOG.info, words, held, rows.count)
 
 
-def _own_part(
-    rows: Rows, decomposition: Decomposition, known: DualNumbering | None
-) -> tuple[DualNumbering, sp.csr_matrix]:
+def _numbered(groups: RowGroups, decomposition: Decomposition, known: DualNumbering | None) -> NumberedRows:
     """Number the multipliers and select the entries of B that act on this rank's subdomains. Collective."""
+    rows = stack([group.rows(decomposition.tearing, decomposition.fixed) for group in groups])
     block = decomposition.copy_block[rows.copy]
     here = block >= 0
     row, column = rows.row[here], decomposition.tearing.components * block[here] + rows.component[here]
@@ -697,4 +601,5 @@ def _own_part(
     if comm.allreduce(int(not stays)) or known is None:
         known = DualNumbering(comm, rows.owner, touched)
     shape = (len(known.local_rows), decomposition.torn_size)
-    return known, sp.csr_matrix((rows.value[here], (known.local_index(row), column)), shape=shape)
+    B = sp.csr_matrix((rows.value[here], (known.local_index(row), column)), shape=shape)
+    return NumberedRows(groups, known, B)

@@ -10,8 +10,10 @@ import numpy as np
 
 from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact.feti.constraints import ConstraintRows
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.by_name import ByName, names_of
+from fenics_contact.results.forces import NodalForces
 
 
 @displayed
@@ -48,23 +50,15 @@ class ConstraintForces(ByName[ConstraintForce]):
         return [Table(rows, 3, ("in [force]",))]
 
 
-def constraint_forces(torn: TornSystem, multiplier: np.ndarray) -> ConstraintForces:
-    """Return what the linear constraints exert. Collective.
-
-    `multiplier`: λ, owned.
-    """
-    rows, scene = torn.constraints, torn.scene
-    if rows is None:
-        return ConstraintForces({})
-    forces, numbers = rows.forces(torn.numbering, torn.after_ties, multiplier), NodeNumbers.of(scene)
-    found = {}
-    for number, name in enumerate(names_of(scene.constraints)):
-        on_nodes = rows.on_nodes(forces, number)
-        bodies = dict.fromkeys(term.body for term in scene.constraints[number].terms)
-        totals = {}
-        for body in bodies:
-            first = numbers.first_of(body)
-            totals[body] = on_nodes[first : first + scene.bodies[body].mesh.n_nodes].sum(axis=0)
-        own = slice(int(rows.first[number]), int(rows.first[number + 1]))
-        found[name] = ConstraintForce(forces[own], totals)
+def constraint_forces(torn: TornSystem, forces: NodalForces) -> ConstraintForces:
+    """Return what the linear constraints exert."""
+    scene, numbers, found = torn.scene, NodeNumbers.of(torn.scene), {}
+    for rows in torn.groups.of(ConstraintRows):
+        for number, name in enumerate(names_of(scene.constraints)):
+            own, on_nodes = rows.of_one(forces.joints[rows], number)
+            totals = {}
+            for body in dict.fromkeys(term.body for term in scene.constraints[number].terms):
+                first = numbers.first_of(body)
+                totals[body] = on_nodes[first : first + scene.bodies[body].mesh.n_nodes].sum(axis=0)
+            found[name] = ConstraintForce(own, totals)
     return ConstraintForces(found)

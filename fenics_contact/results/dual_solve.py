@@ -53,7 +53,7 @@ def sticking(torn: TornSystem, values: RowValues) -> np.ndarray:
     """Return marks of the friction rows of points that do not slip, open ones included, owned."""
     rows, discs = torn.layout.tangential, torn.owned_discs
     step = values.step[rows[:, 0]]
-    elastic = 0.0 if torn.elastic_slip is None else torn.elastic_slip[discs]
+    elastic = torn.groups.slips.elastic_slip[discs]
     trial = values.multiplier[rows] - step[:, None] * values.residual[rows]
     sticks = np.zeros(torn.layout.size, dtype=bool)
     sticks[rows[np.linalg.norm(trial, axis=1) < values.slip_bound * (1.0 + step * elastic)]] = True
@@ -69,20 +69,17 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
     tau, minus_slip, tangential_step = (x[count:].reshape(-1, torn.components - 1) for x in gathered)
     trial_normal = normal - normal_step * gap
     trial_tangential = tau - tangential_step * minus_slip
-    bound = torn.slip_bound(normal[frictional])
+    slips = torn.groups.slips
+    bound = slips.slip_bound(normal[frictional])
     status = np.where(trial_normal > 0, Status.SLIP, Status.OPEN).astype(int)
-    slip = -minus_slip
-    if torn.elastic_slip is not None:
-        slip = slip - torn.elastic_slip[:, None] * tau
-        bound_of_trial = bound * (1.0 + tangential_step[:, 0] * torn.elastic_slip)
-    else:
-        bound_of_trial = bound
+    slip = -minus_slip - slips.elastic_slip[:, None] * tau
+    bound_of_trial = bound * (1.0 + tangential_step[:, 0] * slips.elastic_slip)
     sticks = (np.linalg.norm(trial_tangential, axis=1) < bound_of_trial) & (trial_normal[frictional] > 0)
     status[frictional[sticks]] = Status.STICK
 
     def spread(values: np.ndarray, others: float | np.ndarray = 0.0) -> np.ndarray:
         full = np.empty((count, *values.shape[1:]))
-        full[frictional], full[torn.frictionless] = values, others
+        full[frictional], full[slips.frictionless] = values, others
         return full
 
     gap = gap + torn.reach

@@ -21,6 +21,7 @@ from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import share_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_sum
+from fenics_contact.feti.row_groups import Joint
 from fenics_contact.feti.subdomain import common_kernel, foundation_of
 from fenics_contact.feti.torn import TornSystem
 
@@ -39,25 +40,23 @@ class NodalForces:
         load: f, shape (n_nodes, dim); thermal strain included, which has no resultant.
         reaction: Of supports, zero on free components, shape (n_nodes, dim).
         contact: On the slave at each contact point, shape (n_contact, dim).
-        tie: On the slave at each tied point, shape (n_ties, dim).
+        joints: Of each joint, see `Joint.forces`.
         bed: What materials exert that resist rigid motions (elastic beds), shape (n_nodes, dim).
         foundations: What each elastic foundation of the scene exerts, shape (n_nodes, dim) each.
         moved: Displacement of the points of rigid surfaces by body and surface, shape (dim,), [length]; their
             loads act there; at undeformed ones where they are not among them.
         springs: What springs of tools exert that are not among the beds, by body and surface.
-        constraint: Of linear constraints, shape (n_nodes, dim); None without any.
     """
 
     places: np.ndarray
     load: np.ndarray
     reaction: np.ndarray
     contact: np.ndarray
-    tie: np.ndarray
+    joints: Mapping[Joint, np.ndarray]
     bed: np.ndarray
     foundations: tuple[np.ndarray, ...] = ()
     moved: Mapping[tuple[str, str], np.ndarray] = field(default_factory=dict)
     springs: Mapping[tuple[str, str], Resultant] = field(default_factory=dict)
-    constraint: np.ndarray | None = None
 
     def point_load(self, support: RigidSurface, about: np.ndarray, axisymmetric: bool = False) -> Resultant:
         """Return the load at the point of a rigid surface, about another point."""
@@ -81,14 +80,12 @@ def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndar
     shape (torn_size,), [length].
     """
     decomposition = torn.decomposition
-    contact, tie = _contact_forces(torn, multiplier), _tie_forces(torn, multiplier)
-    joined, constraint = torn.points.on_nodes(contact) + torn.ties.on_nodes(tie), None
-    if torn.constraints is not None:
-        of_equations = torn.constraints.forces(torn.numbering, torn.after_ties, multiplier)
-        constraint = torn.constraints.on_nodes(of_equations)
-        joined += constraint
-    connecting = -nodal_sum(decomposition, torn.force(multiplier))
-    acting, fixed, axes = connecting - joined, decomposition.fixed, decomposition.axes
+    fixed, axes, contact = decomposition.fixed, decomposition.axes, _contact_forces(torn, multiplier)
+    joints = {each: each.forces(torn.gathered(multiplier, each), fixed) for each in torn.groups.joints}
+    joined = torn.points.on_nodes(contact)
+    for joint, forces in joints.items():
+        joined += joint.on_nodes(forces)
+    acting = -nodal_sum(decomposition, torn.force(multiplier)) - joined
     reaction = np.where(fixed, acting, 0.0)
     if axes is not None:
         reaction = axes.to_global(np.where(fixed, axes.to_local(acting), 0.0))
@@ -97,12 +94,11 @@ def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndar
         nodal_sum(decomposition, torn.load),
         reaction,
         contact,
-        tie,
+        joints,
         nodal_sum(decomposition, -_resisted(torn, displacement)),
         tuple(
             nodal_sum(decomposition, -_sprung(torn, displacement, each)) for each in torn.scene.foundations
         ),
-        constraint=constraint,
     )
 
 
@@ -117,17 +113,6 @@ def _contact_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
     force = normal[:, None] * points.normal
     tangential = friction.reshape(-1, torn.components - 1)
     force[frictional] -= np.einsum("na,nad->nd", tangential, points.tangents[frictional])
-    return force
-
-
-def _tie_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
-    """Return the forces on the slave nodes of ties, shape (n_ties, dim), replicated, [force]. Collective."""
-    rows = torn.relations[0]
-    of_ties = torn.numbering.gather(multiplier, np.arange(torn.n_gluing, torn.after_ties))
-    # A row that supports determine is not in B.
-    acting = np.where(rows.held(torn.decomposition.fixed), 0.0, of_ties)
-    force = np.zeros((torn.ties.count, torn.components))
-    np.add.at(force, rows.which, -acting[:, None] * rows.directions)
     return force
 
 
@@ -616,17 +601,16 @@ def _parts(torn: TornSystem, forces: NodalForces) -> dict[str, np.ndarray]:
     tools = np.array([isinstance(master, RigidTool) for master in masters], dtype=bool)[torn.points.pair]
     meets_body = np.diff(torn.points.master.indptr) > 0
     driven = np.flatnonzero(tools & ~meets_body)  # supports of such a tool hold what presses on it
-    springs = torn.ties.count - len(torn.scene.springs)
-    tied = by_node(torn.ties, forces.tie, np.arange(springs))
-    sprung = by_node(torn.ties, forces.tie, np.arange(springs, torn.ties.count))
-    constrained = 0.0 if forces.constraint is None else forces.constraint
-    return {
+    parts = {
         "loads": forces.load,
         "reactions": forces.reaction + by_node(torn.points, forces.contact, driven),
         "obstacles": by_node(torn.points, forces.contact, np.flatnonzero(~meets_body & ~tools)),
-        "gaps": by_node(torn.points, forces.contact, np.flatnonzero(meets_body)) + tied + constrained,
-        "beds": sum(forces.foundations, forces.bed) + sprung,
+        "gaps": by_node(torn.points, forces.contact, np.flatnonzero(meets_body)),
+        "beds": sum(forces.foundations, forces.bed),
     }
+    for joint, of_joint in forces.joints.items():
+        parts[joint.balanced_as] = parts[joint.balanced_as] + joint.on_nodes(of_joint)
+    return parts
 
 
 def _middle(places: np.ndarray) -> np.ndarray:
@@ -671,11 +655,12 @@ def pair_resultants(
             found.append(resultant(force[mine], places, point, pair.slave, scene.axisymmetric))
         return Resultants(kind, tuple(found), tuple(pair.place for pair in pairs))
 
+    tied = np.concatenate([forces.joints[each] for each in torn.tie_rows])
     normal = torn.points.normal
     tangential = forces.contact - np.einsum("nd,nd->n", forces.contact, normal)[:, None] * normal
     rubs = np.array([pair.has_friction for pair in scene.contacts], dtype=bool)[torn.points.pair]
     return PairResultants(
         of("contact", scene.contacts, torn.points, forces.contact),
         of("friction", scene.contacts, torn.points, np.where(rubs[:, None], tangential, 0.0)),
-        of("tie", scene.ties, torn.ties, forces.tie),
+        of("tie", scene.ties, torn.ties, tied),
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact.feti.preloads import shortening_columns
+from fenics_contact.feti.preloads import SectionRows
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.by_name import ByName, names_of
 from fenics_contact.results.forces import NodalForces, Resultant, resultant
@@ -84,21 +84,19 @@ class Preloads(ByName[SectionForces]):
 
 def shortenings(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
     """Return the shortening of each preload of a torn displacement, (n_preloads,), replicated. Collective."""
-    columns = shortening_columns(torn.scene, torn.relations[0])
-    rows = np.arange(torn.n_gluing, torn.n_gluing + columns.shape[0])
-    jump = torn.numbering.gather(torn.jump(displacement), rows)
-    return np.asarray((columns.T @ jump) / np.asarray(columns.power(2).sum(axis=0)).ravel())
+    jump, found = torn.jump(displacement), [np.zeros(0)]
+    found += [rows.lengths(torn.gathered(jump, rows)) for rows in torn.groups.of(SectionRows)]
+    return np.concatenate(found)
 
 
 def section_forces(torn: TornSystem, forces: NodalForces, displacement: np.ndarray) -> Preloads:
     """Return what the sections transmit. Collective."""
-    scene, lengths = torn.scene, shortenings(torn, displacement)
-    found = {}
-    for number, (name, preload) in enumerate(zip(names_of(scene.preloads), scene.preloads, strict=True)):
-        mine = torn.ties.pair == len(scene.ties) + number
-        nodes = torn.ties.slave[mine]
-        places = forces.places[nodes]
-        total = resultant(forces.tie[mine], places, places.mean(axis=0), axisymmetric=scene.axisymmetric)
-        normal = preload.normal(scene.bodies[preload.body].mesh)
-        found[name] = SectionForces(float(lengths[number]), normal, total)
+    scene, lengths, found = torn.scene, shortenings(torn, displacement), {}
+    for rows in torn.groups.of(SectionRows):
+        for number, (name, preload) in enumerate(zip(names_of(scene.preloads), scene.preloads, strict=True)):
+            mine = rows.points.pair == number
+            places, acting = forces.places[rows.points.slave[mine]], forces.joints[rows][mine]
+            total = resultant(acting, places, places.mean(axis=0), axisymmetric=scene.axisymmetric)
+            normal = preload.normal(scene.bodies[preload.body].mesh)
+            found[name] = SectionForces(float(lengths[number]), normal, total)
     return Preloads(found)

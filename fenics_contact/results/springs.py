@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact.feti.springs import SpringRows
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.by_name import ByName, names_of
 from fenics_contact.results.forces import NodalForces
@@ -65,14 +66,10 @@ def spring_forces(torn: TornSystem, forces: NodalForces, multiplier: np.ndarray)
 
     `multiplier`: λ, owned.
     """
-    springs, rows = torn.scene.springs, torn.springs
-    if rows is None:
-        return SpringForces({})
-    tension = torn.numbering.gather(multiplier, np.arange(torn.first_sprung, torn.after_ties))
-    elongation = rows.compliance * (tension - rows.tension)
-    on_first = -forces.tie[torn.ties.count - len(springs) :]
     found = {}
-    for number, name in enumerate(names_of(springs)):
-        mine = rows.spring == number
-        found[name] = SpringForce(on_first[number], elongation[mine], rows.directions[mine])
+    for rows in torn.groups.of(SpringRows):
+        elongation = rows.elongation(torn.gathered(multiplier, rows))
+        for number, name in enumerate(names_of(torn.scene.springs)):
+            mine, on_first = rows.which == number, -forces.joints[rows][number]
+            found[name] = SpringForce(on_first, elongation[mine], rows.directions[mine])
     return SpringForces(found)

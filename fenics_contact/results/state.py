@@ -122,20 +122,10 @@ def compute_energies(
     """
     internal = torn.load - torn.force(multiplier)  # = K u
     strained = 0.5 * internal @ (displacement - rigid)
-    mine = np.array([strained, multiplier @ torn.right, *softened(torn, multiplier)])
+    mine = np.array([strained, multiplier @ torn.right, *torn.compliance.energies(multiplier)])
     strain, prescribed, given_way, work = (float(total) for total in torn.numbering.comm.allreduce(mine))
     load = torn.load_work(displacement)
     return Energies(strain, load, friction, -strain - prescribed - work, given_way - work)
-
-
-def softened(torn: TornSystem, multiplier: np.ndarray) -> tuple[float, float]:
-    """Return λᵀC(λ) and Φ(λ) of this rank's rows, [force · length]; zero where contact is exact."""
-    compliance, give = torn.compliance, torn.give
-    sprung = 0.0 if give is None else float(multiplier @ (give * multiplier))
-    if compliance is None:
-        return sprung, 0.5 * sprung
-    pressing = compliance.given_way(multiplier)
-    return sprung + float(multiplier @ pressing), 0.5 * sprung + compliance.work(multiplier)
 
 
 def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress: str = "") -> list[str]:
@@ -522,7 +512,7 @@ class State(ABC):
         Example:
             >>> state.constraints()["geared"].force  # doctest: +SKIP
         """
-        return constraint_forces(self.torn, self.solution.multiplier)
+        return constraint_forces(self.torn, self._nodal_forces)
 
     @collectively("State.preloads", comm_of)
     def preloads(self) -> Preloads:

@@ -143,7 +143,7 @@ def _compared(state: LinearState, earlier: tuple[State, ...], solver: FaceNewton
     exact = as_linear(problem.solve(before=earlier[-1] if earlier else None), "true errors")
     norm = exact.energies.norm
     total = _distance(state, exact.dual_solution, exact.torn_displacement) / norm
-    if not np.any(state.torn.friction_coefficient > 0.0):
+    if not np.any(state.torn.groups.slips.coefficient > 0.0):
         doubt = certify(exact.dual, exact.dual_solution).bound / norm
         return TrueErrors(total, total, doubt, solver.tolerance)
     own = solve(state.dual.problem, state.dual_solution.slip_bound, solver, state.dual_solution.multiplier)

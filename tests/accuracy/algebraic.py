@@ -193,7 +193,7 @@ def measured(state: AnyState, finest: float = 1e-11) -> Measured:
     tresca = solve(system.problem, solution.slip_bound, exact, solution)
     at_bounds = system.displacement(tresca.multiplier, tresca.alpha)
     right = at_bounds
-    if np.any(state.torn.friction_coefficient > 0):
+    if np.any(state.torn.groups.slips.coefficient > 0):
         coulomb = solve_dual(system, exact, solution)
         right = system.displacement(coulomb.multiplier, coulomb.alpha)
     norm = energy_norm(state, right)

@@ -23,13 +23,12 @@ from fenics_contact import (
 from fenics_contact._adaptive import boundary_errors, goal_errors
 from fenics_contact._adaptive.contact_residuals import between_nodes
 from fenics_contact._adaptive.goal_errors import goal_error
-from fenics_contact._adaptive.resultants import SupportForce, _of_ties
+from fenics_contact._adaptive.resultants import SupportForce, _of_joints
 from fenics_contact._surfaces.facets import faceted_surface
 from fenics_contact._surfaces.true_surface import by_shape
 from fenics_contact.design import Movement, Objective, TotalPotential
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
-from fenics_contact.results.forces import _tie_forces
 from fenics_contact.shapes import Cylinder
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
@@ -89,14 +88,16 @@ def test_rows_that_supports_determine_carry_no_force_of_a_tie() -> None:
     state = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9).solve()
     assert isinstance(state, LinearState)
     torn = state.torn
-    rows = torn.n_gluing + np.arange(torn.relations[0].count)
-    assert torn.relations[0].held(torn.decomposition.fixed).all()
+    (_, slides), fixed = torn.tie_rows, torn.decomposition.fixed
+    rows = torn.groups.rows_of(slides)
+    assert slides.count
+    assert slides.held(fixed).all()
     forced = state.solution.multiplier.copy()
     forced[torn.numbering.owned_index(rows)] = 1.0
-    assert np.abs(_tie_forces(torn, forced)).max() == 0.0
+    assert np.abs(slides.forces(torn.gathered(forced, slides), fixed)).max() == 0.0
     held = SupportForce("upper", "z0", (0.0, 0.0, 1.0))._held(state)
     assert np.abs(torn.ties.relative(held)).max() == pytest.approx(1.0)
-    assert np.abs(_of_ties(torn, held)).max() == 0.0
+    assert np.abs(_of_joints(torn, held)).max() == 0.0
 
 
 def test_chords_of_a_cylinder_move_until_they_enclose_its_area_at_rims_too() -> None:

@@ -15,7 +15,7 @@ def slip_bound(state: AnyState) -> np.ndarray:
     """Return Ψ = given bound + μ λ_N of every disc, from the scene's data and the answer's normal forces."""
     torn, layout = state.system.torn, state.system.problem.layout
     normal = state.solution.multiplier[layout.normal[layout.friction_of]]
-    return torn.tresca_bound + torn.friction_coefficient * np.maximum(normal, 0.0)
+    return torn.groups.slips.tresca_bound + torn.groups.slips.coefficient * np.maximum(normal, 0.0)
 
 
 def residuals(state: AnyState) -> dict[str, float]:

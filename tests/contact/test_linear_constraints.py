@@ -33,7 +33,7 @@ from fenics_contact import (
 from fenics_contact._adaptive.refined_scene import refine_scene
 from fenics_contact._scene.constraints import with_values
 from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.feti.constraints import independent_rows
+from fenics_contact.feti.constraints import ConstraintRows, independent_rows
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, StVenantKirchhoff
 from fenics_contact.materials.elastic import lame
@@ -179,7 +179,7 @@ def test_many_nodes_follow_one_and_their_rows_stay_sparse() -> None:
     moved = state.gather_displacement("a")[mesh.nodes_of("x1")]
     assert np.ptp(moved[:, 1]) > 1e-4
     assert np.ptp(moved[:, 0]) < 1e-9 * np.abs(moved[:, 0]).max()
-    rows = state.torn.constraints
+    (rows,) = state.torn.groups.of(ConstraintRows)
     assert rows.count == 8 * 8 - 1
     assert rows.left_out == 1  # that of the corner itself, which cancels
     gram = rows.free @ rows.free.T
@@ -231,7 +231,8 @@ def test_equations_that_contradict_are_refused_and_those_that_follow_are_left_ou
         solve_scene(replace(scene, constraints=[at_support]), MPI.COMM_SELF)
     agreed = [both[0], both[0].with_value(0.01), at_support.with_value(0.0)]
     state = solve_scene(replace(scene, constraints=agreed), MPI.COMM_SELF, tolerance=1e-10)
-    assert state.torn.constraints.left_out == 2
+    (rows,) = state.torn.groups.of(ConstraintRows)
+    assert rows.left_out == 2
     forces = [float(each.force[0]) for each in state.constraints().values()]
     assert sorted(map(abs, forces))[:2] == [0.0, 0.0]
     assert max(map(abs, forces)) > 0.5

@@ -31,7 +31,7 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact.__main__ import main
-from fenics_contact._equilibrium.deformed import drawn_as
+from fenics_contact._equilibrium.deformed import begun_as
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.feti.preloads import shortening_scales
 from fenics_contact.gallery import block, rectangle
@@ -473,9 +473,9 @@ def test_a_joint_of_rubber_is_tightened_held_pulled_and_tightened_again():
     assert little.preloads()["bolt"].force == pytest.approx(20.0 + sleeve, rel=1e-5)
     assert more.contact.normal_force.sum() == pytest.approx(70.0, rel=1e-5)
     # On the way forces start from what held bolts carried, and lengths from where free ones were.
-    half = more.load.between(drawn_as(apart, apart.load, more.load), 0.5)
+    half = more.load.between(begun_as(apart, apart.load, more.load), 0.5)
     assert half.torn.free.load * shortening_scales(scene) == pytest.approx(85.0, rel=1e-6)
-    half = little.load.between(drawn_as(tightened, tightened.load, little.load), 0.5)
+    half = little.load.between(begun_as(tightened, tightened.load, little.load), 0.5)
     open_ = half.torn.right - half.torn.jump(tightened.torn_displacement)
     ties = slice(half.torn.n_gluing, half.torn.n_equality)
     assert np.abs(half.torn.numbering.gather(open_, np.arange(half.torn.n_equality))[ties]).max() < 1e-6

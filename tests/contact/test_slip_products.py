@@ -28,7 +28,7 @@ def test_friction_along_held_tangents_in_a_start_costs_hardly_a_product(
     quarter: LinearState, size: float
 ) -> None:
     torn, start = quarter.torn, 0.8 * quarter.solution.multiplier
-    held = torn.relations[2].held(torn.decomposition.fixed)
+    held = torn.groups.slips.held(torn.decomposition.fixed)
     rows = torn.numbering.owned_index(torn.tangential_rows.ravel()[held])
     assert len(rows) == 6
     products = []

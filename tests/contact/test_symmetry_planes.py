@@ -87,7 +87,7 @@ def test_contact_rows_leave_prescribed_components_to_the_supports() -> None:
     assert (fixed[torn.points.slave].any(axis=1) & ~fixed[torn.points.slave].all(axis=1)).sum() == 5
     product = torn.B[: torn.n_equality] @ torn.B[torn.n_equality :].T
     assert abs(product).max() < 1e-14
-    assert torn.relations[2].held(fixed).sum() == 5, "sliding across the plane of symmetry"
+    assert torn.groups.slips.held(fixed).sum() == 5, "sliding across the plane of symmetry"
 
 
 def test_supports_that_move_both_surfaces_make_them_slip() -> None:
@@ -168,7 +168,7 @@ def torn_of(scene: Scene) -> TornSystem:
 @pytest.mark.parametrize("slope", [0.004, 0.1, 0.5])
 def test_normals_lie_in_a_plane_of_symmetry_however_the_face_is_tilted(slope: float) -> None:
     torn = torn_of(tilted(slope))
-    fixed, points, slip = torn.decomposition.fixed, torn.points, torn.relations[2]
+    fixed, points, slip = torn.decomposition.fixed, torn.points, torn.groups.slips
     on_plane = fixed[points.slave, 1]
     assert on_plane.sum() == 5
     np.testing.assert_array_equal(points.normal[on_plane, 1], 0.0)
@@ -213,7 +213,7 @@ def test_a_held_slave_node_keeps_its_friction_where_its_master_can_move(share: f
     contact, fixed = state.contact, state.torn.decomposition.fixed
     driven = np.flatnonzero(fixed[contact.points.slave, 0])
     assert len(driven) == 4
-    assert not state.torn.relations[2].held(fixed).any()
+    assert not state.torn.groups.slips.held(fixed).any()
     displacement = np.vstack([state.gather_displacement(name) for name in state.scene.bodies])
     moved = (contact.points.jump @ displacement)[driven]
     across = np.einsum("na,nad->nd", contact.slip, contact.points.tangents)[driven]
@@ -231,7 +231,7 @@ def test_a_held_slave_node_keeps_its_friction_where_its_master_can_move(share: f
 @pytest.mark.parametrize(("share", "held"), [(4e-6, False), (2e-7, True)])
 def test_what_is_left_free_by_rounding_alone_is_held(share: float, held: bool) -> None:
     torn = torn_of(beside(share))
-    slip, fixed = torn.relations[2], torn.decomposition.fixed
+    slip, fixed = torn.groups.slips, torn.decomposition.fixed
     on_side = fixed[slip.points.slave[slip.which], 0] & (np.abs(slip.directions[:, 0]) > 0.9)
     assert on_side.sum() == 4
     assert (slip.held(fixed)[on_side] == held).all()
@@ -246,7 +246,7 @@ def test_slip_across_two_rollers_is_no_slip_when_it_only_opens(tilt: float) -> N
     scene = scene.moved({"lower": points})
     held = [Support(name, face, (None, 0.0, None)) for name, face in (("lower", "z1"), ("upper", "z0"))]
     torn = torn_of(replace(scene, supports=[scene.supports[0], *held]))
-    slip, fixed = torn.relations[2], torn.decomposition.fixed
+    slip, fixed = torn.groups.slips, torn.decomposition.fixed
     assert slip.held(fixed).reshape(-1, 2).tolist() == [[True, False]] * torn.points.count
     ways = slip.directions.reshape(-1, 2, 3)[:, 1]
     np.testing.assert_allclose(ways[:, 1], 0.0, atol=1e-15)
@@ -263,11 +263,11 @@ def test_a_way_down_a_slope_is_slip_where_it_is_more_slip_than_opening(degrees: 
     supports = [Support("block", "z0", (None, 0.0, None)), Support("block", "z1")]
     pair = ContactPair(Surface("block", "z0"), wall, Coulomb(0.3))
     torn = torn_of(Scene({"block": Body(mesh, STEEL)}, supports, contacts=[pair]))
-    slip, fixed = torn.relations[2], torn.decomposition.fixed
+    slip, fixed = torn.groups.slips, torn.decomposition.fixed
     way = np.abs(slip.directions[:, 2]) > 1e-3
     assert way.sum() == torn.points.count == 24
     assert (slip.held(fixed)[way] == held).all()
-    assert not torn.relations[1].held(fixed).any()
+    assert not torn.groups.normal.held(fixed).any()
 
 
 def test_a_surface_that_lies_in_a_plane_of_symmetry_keeps_its_normals() -> None:
@@ -286,7 +286,7 @@ def test_surfaces_that_supports_hold_but_for_a_tilt_get_the_room_that_faceting_t
     scene = tilted(0.01)
     sides = [Support("lower", "z1", (None, None, 0.0)), Support("upper", "z0", (None, None, -0.004))]
     torn = torn_of(replace(scene, supports=[Support("lower", "z0"), *sides]))
-    fixed, normal = torn.decomposition.fixed, torn.relations[1]
+    fixed, normal = torn.decomposition.fixed, torn.groups.normal
     assert 0.0 < normal.freedom(fixed).max() < 0.02
     prescribed = np.where(torn.supported[torn.normal_rows] > torn.points.gap, 1, 0)
     assert prescribed.any()

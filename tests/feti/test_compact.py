@@ -32,7 +32,8 @@ def systems(torn: TornSystem) -> dict[LocalKind, DualSystem]:
 
 def solved(system: DualSystem, tolerance: float) -> DualSolution:
     torn = system.torn
-    coefficient, bound = (x[torn.owned_discs] for x in (torn.friction_coefficient, torn.tresca_bound))
+    slips = torn.groups.slips
+    coefficient, bound = (x[torn.owned_discs] for x in (slips.coefficient, slips.tresca_bound))
     return solve(system.problem, bound, FaceNewton(tolerance=tolerance), friction_coefficient=coefficient)
 
 

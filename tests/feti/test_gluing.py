@@ -243,10 +243,7 @@ def measured(torn_in_contact: TornSystem, field: np.ndarray) -> np.ndarray:
     """Return what all rows measure of a nodal displacement, with the share of prescribed components."""
     found = torn_in_contact.B @ in_space(torn_in_contact, field)
     prescribed = np.where(torn_in_contact.decomposition.fixed, field, np.nan)
-    found[torn_in_contact.n_gluing :] += np.concatenate(
-        [part.of_supports(prescribed) for part in torn_in_contact.relations]
-    )
-    return found
+    return found + torn_in_contact.groups.of_supports(prescribed)
 
 
 def all_points(torn_in_contact: TornSystem) -> np.ndarray:
@@ -350,9 +347,10 @@ def test_a_frictionless_scene_has_no_tangential_rows(torn_in_contact: TornSystem
 
 def test_slip_bounds_belong_to_their_laws(torn_in_contact: TornSystem) -> None:
     pair = torn_in_contact.points.pair[torn_in_contact.frictional]
-    np.testing.assert_array_equal(torn_in_contact.friction_coefficient, np.where(pair == 0, 0.3, 0.0))
+    slips = torn_in_contact.groups.slips
+    np.testing.assert_array_equal(slips.coefficient, np.where(pair == 0, 0.3, 0.0))
     area = torn_in_contact.points.area[torn_in_contact.frictional]
-    np.testing.assert_allclose(torn_in_contact.tresca_bound, np.where(pair == 1, 0.4 * area, 0.0))
+    np.testing.assert_allclose(slips.tresca_bound, np.where(pair == 1, 0.4 * area, 0.0))
     assert area[pair == 1].sum() == pytest.approx(0.8), "nodal areas add up to the surface"
     assert area[pair == 0].sum() == pytest.approx(1.6**2)
 

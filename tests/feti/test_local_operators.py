@@ -212,8 +212,8 @@ def test_both_kinds_give_the_same_contact_forces() -> None:
     answers = []
     for kind in (LocalKind.IMPLICIT, LocalKind.EXPLICIT):
         system = DualSystem(torn, kind=kind)
-        coefficient = torn.friction_coefficient[system.torn.owned_discs]
-        bound = torn.tresca_bound[system.torn.owned_discs]
+        coefficient = torn.groups.slips.coefficient[system.torn.owned_discs]
+        bound = torn.groups.slips.tresca_bound[system.torn.owned_discs]
         answers.append(
             solve(system.problem, bound, FaceNewton(tolerance=1e-9), friction_coefficient=coefficient)
         )
@@ -247,8 +247,8 @@ def test_weighting_by_stiffness_saves_products_where_materials_differ(
     torn = build_torn_system(scene, decompose(scene, partitions, MPI.COMM_SELF))
 
     def products() -> int:
-        problem, law = DualSystem(torn).problem, torn.friction_coefficient
-        return solve(problem, torn.tresca_bound, FaceNewton(), friction_coefficient=law).products
+        problem, law = DualSystem(torn).problem, torn.groups.slips.coefficient
+        return solve(problem, torn.groups.slips.tresca_bound, FaceNewton(), friction_coefficient=law).products
 
     weighted = products()
     monkeypatch.setattr(DualSystem, "_compliance", lambda self: np.ones(len(self.inverse.interface)))

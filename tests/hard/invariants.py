@@ -12,7 +12,6 @@ from fenics_contact import Scene
 from fenics_contact._scene.plan import resisted_motions
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.feti.decomposition import prescribed_displacements
-from fenics_contact.feti.initial_gaps import gap_with_room
 from fenics_contact.materials import rigid_body_modes
 from fenics_contact.results.deformed_state import AnyState
 from tests.contact.checks import residuals
@@ -46,7 +45,7 @@ class Whole:
         self.load = force.reshape(-1, dim)
         self.fixed = decomposition.fixed
         prescribed = prescribed_displacements(scene, tearing)
-        self.gap = gap_with_room(self.torn.relations[1], self.fixed, prescribed)
+        self.gap = self.torn.groups.normal.gap(prescribed)
 
     def nodes(self, body: str) -> slice:
         """Return which nodes are a body's."""
@@ -142,7 +141,7 @@ def _forces(state: AnyState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     torn, contact = state.torn, state.contact
     bound = np.zeros(torn.points.count)
     press = np.maximum(contact.normal_force[torn.frictional], 0.0)
-    bound[torn.frictional] = torn.tresca_bound + torn.friction_coefficient * press
+    bound[torn.frictional] = torn.groups.slips.tresca_bound + torn.groups.slips.coefficient * press
     return contact.normal_force, contact.friction_force, bound
 
 

@@ -152,8 +152,8 @@ MUTATIONS = (
     Mutation(
         "reactions contain what contact exerts on prescribed components",
         "results/forces.py",
-        "connecting - joined",
-        "connecting",
+        "torn.force(multiplier)) - joined",
+        "torn.force(multiplier))",
         ("tests/contact/test_resultants.py::test_all_forces_balance",),
     ),
     Mutation(
@@ -182,9 +182,9 @@ MUTATIONS = (
     ),
     Mutation(
         "contact does not see rigid surfaces move",
-        "feti/free_motions.py",
-        "moved = [-relation.of_supports(mode)",
-        "moved = [0.0 * relation.of_supports(mode)",
+        "feti/row_groups.py",
+        "moved = [group.driven(",
+        "moved = [0.0 * group.driven(",
         (f"{RIGID}::test_a_rigid_surface_is_a_support_that_moves_by_itself",),
     ),
     Mutation(
@@ -291,9 +291,9 @@ MUTATIONS = (
     ),
     Mutation(
         "sliding ties are bonded",
-        "feti/contact_rows.py",
-        "sliding = are_sliding(ties, points.pair)",
-        "sliding = are_sliding(ties, points.pair) & False",
+        "feti/ties.py",
+        "points = ties.part(~are_sliding(scene.ties, ties.pair))",
+        "points = ties",
         ("tests/contact/test_ties.py::test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to",),
     ),
     Mutation(
@@ -341,8 +341,8 @@ MUTATIONS = (
     Mutation(
         "Tresca's bound and the load are in two units",
         "_equilibrium/static_admissibility.py",
-        "np.minimum(torn.tresca_bound / scale, largest)",
-        "np.minimum(torn.tresca_bound, largest)",
+        "np.minimum(torn.groups.slips.tresca_bound / scale, largest)",
+        "np.minimum(torn.groups.slips.tresca_bound, largest)",
         (
             "tests/contact/test_held.py::test_the_limit_of_friction_does_not_depend_on_the_units"
             "[1e-06-1e-06-friction1]",

@@ -99,15 +99,15 @@ UNSEEN_MUTATIONS = (
     Mutation(
         "a force of supports counts ties that supports determine",
         "_adaptive/resultants.py",
-        "np.where(rows.held(torn.decomposition.fixed), 0.0, work)",
-        "work",
+        "np.where(joint.held(torn.decomposition.fixed), 0.0, joint.measured(held))",
+        "joint.measured(held)",
         (HELD_TIES,),
     ),
     Mutation(
         "reactions count ties that supports determine",
-        "results/forces.py",
-        "np.where(rows.held(torn.decomposition.fixed), 0.0, of_ties)",
-        "of_ties",
+        "feti/ties.py",
+        "np.where(self.held(fixed), 0.0, multiplier)",
+        "multiplier",
         (HELD_TIES,),
     ),
     Mutation(

@@ -226,7 +226,7 @@ class Monolithic:
             self.multiplier = np.zeros(len(torn.right))
         (mechanics,) = self._equations._mechanics
         layout, u, lam = torn.layout, self._u, self.multiplier
-        mu = torn.friction_coefficient
+        mu = torn.groups.slips.coefficient
         B, n, m = torn.B, len(u), len(torn.right)
         for number in range(40):
             response = mechanics.at(u)

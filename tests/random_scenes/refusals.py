@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 
 import clarabel
 import numpy as np
@@ -17,6 +16,7 @@ from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import FenicsContactError, InfeasibleError, InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
+from fenics_contact.feti.torn import with_points
 from tests.random_scenes.generator import Sample
 from tests.random_scenes.kinematics import Side, above, own_distance
 from tests.random_scenes.verifier import loose, moving
@@ -205,7 +205,7 @@ def _torn(made: Sample) -> TornSystem:
     torn = build_torn_system(scene, decompose(scene, one, MPI.COMM_SELF), overlap=True)
     points = torn.points
     kept = np.flatnonzero(moving(points, Whole(scene)))
-    return replace(torn, points=points.part(kept))
+    return with_points(torn, points.part(kept))
 
 
 def _held_after_all(made: Sample) -> str:

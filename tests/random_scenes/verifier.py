@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -79,7 +80,7 @@ class TurnedBack:
     def __init__(self, state: AnyState, plain: Scene, turn: np.ndarray) -> None:
         self._state, self._turn, self.scene = state, turn, plain
         self.contact = replace(state.contact, points=self._unturned(state.contact.points))
-        self.torn = replace(state.torn, ties=self._unturned(state.torn.ties))
+        self.torn = SimpleNamespace(ties=self._unturned(state.torn.ties))
 
     def _unturned(self, points: ContactPoints) -> ContactPoints:
         return replace(points, normal=points.normal @ self._turn, tangents=points.tangents @ self._turn)

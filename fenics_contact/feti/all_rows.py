@@ -1,0 +1,112 @@
+"""All groups of rows of a system, and their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._scene.scene import Scene
+from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
+from fenics_contact.feti.row_groups import Glued, Joint, RowGroup, Unknowns
+
+Kind = TypeVar("Kind", bound=RowGroup)
+
+
+@dataclass(frozen=True, eq=False)
+class RowGroups:
+    """All groups of a system in the order of their rows.
+
+    Attributes:
+        glued: The rows that glue subdomains and fix them at supports.
+        joints: What joins bodies, in the order of `feti.joints`.
+        normal: Those of contact along the normals, one for each contact point.
+        slips: Those along the tangents, dim − 1 for each point with friction.
+        further: Rows that a linearisation adds.
+    """
+
+    glued: Glued
+    joints: tuple[Joint, ...]
+    normal: NormalRows
+    slips: TangentialRows
+    further: tuple[RowGroup, ...] = ()
+
+    @cached_property
+    def members(self) -> tuple[RowGroup, ...]:
+        """All of them."""
+        return (self.glued, *self.joints, self.normal, self.slips, *self.further)
+
+    def __iter__(self) -> Iterator[RowGroup]:
+        """Return them in their order."""
+        return iter(self.members)
+
+    def of(self, kind: type[Kind]) -> tuple[Kind, ...]:
+        """Return those of a kind."""
+        return tuple(each for each in self.members if isinstance(each, kind))
+
+    @cached_property
+    def _first(self) -> dict[RowGroup, int]:
+        ends = np.cumsum([each.count for each in self.members])
+        return {each: int(end) - each.count for each, end in zip(self.members, ends, strict=True)}
+
+    @property
+    def total(self) -> int:
+        """Number of rows."""
+        return sum(each.count for each in self.members)
+
+    @property
+    def n_equality(self) -> int:
+        """Number of rows before those of contact."""
+        return self._first[self.normal]
+
+    def rows_of(self, group: RowGroup) -> np.ndarray:
+        """Return the numbers of the rows of a group, shape (count,)."""
+        return self._first[group] + np.arange(group.count)
+
+    def within(self, group: RowGroup, values: np.ndarray) -> np.ndarray:
+        """Return the part of a group of values of all rows."""
+        return values[self._first[group] : self._first[group] + group.count]
+
+    def marks(self, chosen: Sequence[RowGroup]) -> np.ndarray:
+        """Return marks of the rows of some groups, shape (total,)."""
+        return np.repeat([each in chosen for each in self.members], [each.count for each in self.members])
+
+    def of_supports(self, prescribed: np.ndarray) -> np.ndarray:
+        """Return what prescribed displacements are in all rows of free ones, shape (total,), [length]."""
+        return np.concatenate([each.of_supports(prescribed) for each in self.members])
+
+    def driven(self, change: np.ndarray) -> np.ndarray:
+        """Return by how much c of all rows changes with prescribed displacements, (total,), [length]."""
+        return np.concatenate([each.driven(change) for each in self.members])
+
+    @property
+    def compliance(self) -> np.ndarray:
+        """The diagonal of C of all rows, shape (total,), [length / force]."""
+        return np.concatenate([each.compliance for each in self.members])
+
+    def columns(self, fields: sp.csr_matrix) -> sp.csr_matrix:
+        """Return by how much fields of nodes, (n_nodes · dim, n), close all rows, shape (total, n)."""
+        return sp.vstack([each.columns(fields) for each in self.members], format="csr")
+
+    def unknowns(self, scene: Scene) -> Unknowns:
+        """Return the unknowns that groups have of their own, on all rows."""
+        own = [each.unknowns(scene) for each in self.members]
+        columns = sp.block_diag([each.columns for each in own], format="csr")
+        return Unknowns(columns, np.concatenate([each.load for each in own]))
+
+    @property
+    def fitted(self) -> tuple[RowGroup, ...]:
+        """Those to which free motions are fitted: rows of supports alone where no group has unknowns."""
+        if any(each.draws for each in self.members):
+            return tuple(each for each in self.members if each.closes)
+        return (self.glued,)
+
+    def with_points(self, points: ContactPoints) -> RowGroups:
+        """Return those whose contact points have other gaps."""
+        normal, slips = replace(self.normal, points=points), replace(self.slips, points=points)
+        return replace(self, normal=normal, slips=slips)
