@@ -353,3 +353,9 @@ def _first_ranks(comm: MPI.Comm, count: int) -> MPI.Comm:
     if key not in _subsets:
         _subsets[key] = comm.Split(0 if comm.rank < count else MPI.UNDEFINED)
     return _subsets[key]
+
+
+def rounded(values: Any, scale: float) -> np.ndarray:
+    """Return numbers, shape (n,), with what is rounding of a scale set to zero."""
+    numbers = np.atleast_1d(np.asarray(values, dtype=float))
+    return np.where(np.abs(numbers) > ROUNDING * scale, numbers, 0.0)

@@ -23,6 +23,7 @@ from rich.text import Text
 
 from fenics_contact._base.display import COLUMNS, counted, force_units
 from fenics_contact._base.progress import at_terminal, visible
+from fenics_contact._base.sparse import rounded
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import (
     ConvergenceError,
@@ -34,9 +35,9 @@ from fenics_contact.errors import (
 from fenics_contact.errors.memory import naming_memory
 from fenics_contact.output.files import OutputError
 from fenics_contact.output.result import listed_forces, scales_of
-from fenics_contact.output.tables import rounded
 from fenics_contact.results.by_name import names_of
 from fenics_contact.results.contact import NormalForces
+from fenics_contact.results.joints import joint_results
 from fenics_contact.results.resolution import in_words
 from fenics_contact.results.state import State, pairs_in_words
 
@@ -284,14 +285,8 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
         rows[f"contact {number}"] = words
     for number, motion in enumerate(state.rigid_motions()):
         rows[f"rigid surface {number}"] = str(motion).replace("[length]", units.length)
-    for name, each in state.preloads().items() if state.scene.preloads else ():
-        rows[f"preload {name}"] = f"{each.force:.6g} {force}, shorter by {each.shortening:.6g} {units.length}"
-    for name, spring in state.springs().items() if state.scene.springs else ():
-        size, longer = np.linalg.norm(spring.force), np.linalg.norm(spring.elongation)
-        rows[f"spring {name}"] = f"{size:.6g} {force}, ends moved by {longer:.6g} {units.length}"
-    for name, held in state.constraints().items() if state.scene.constraints else ():
-        on = (f"{np.linalg.norm(total):.6g} {force} on {body}" for body, total in held.on_bodies.items())
-        rows[f"constraint {name}"] = ", ".join(on)
+    for each in joint_results(state):
+        rows |= each.facts(force, units.length)
     if state.unheld:
         rows["held by nothing"] = " and ".join(map(str, state.unheld)) + ": stays where it is"
     if state.known_errors is not None:

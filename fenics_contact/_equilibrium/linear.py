@@ -238,12 +238,12 @@ def _again(
 def _checked(torn: TornSystem, known: State | None) -> TornSystem:
     """Return a system whose bodies are held against their loads, unless that is known. Collective."""
     same = known is not None and torn.points is known.torn.points
-    if known is None or not same or _loads_of(torn.scene) != _loads_of(known.scene):
+    if known is None or not same or _loads_of(torn) != _loads_of(known.torn):
         check_held(torn)
     return torn
 
 
-def _loads_of(scene: Scene) -> tuple[list[Any], ...]:
-    """Return the loads of a scene, the rigid surfaces, at whose points loads act, preloads and springs."""
-    rigid = [each for each in scene.supports if isinstance(each, RigidSurface)]
-    return list(scene.loads), rigid, list(scene.preloads), list(scene.springs)
+def _loads_of(torn: TornSystem) -> tuple[list[Any], ...]:
+    """Return the loads of a system, the rigid surfaces, at whose points loads act, and those of unknowns."""
+    rigid = [each for each in torn.scene.supports if isinstance(each, RigidSurface)]
+    return list(torn.scene.loads), rigid, torn.free.load.tolist()

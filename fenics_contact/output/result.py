@@ -40,6 +40,7 @@ from fenics_contact.readers.gmsh_session import interrupt_handler_kept
 from fenics_contact.results.area import contact_area
 from fenics_contact.results.contact import Status
 from fenics_contact.results.forces import Resultant
+from fenics_contact.results.joints import joint_results
 from fenics_contact.results.linear_state import as_linear
 from fenics_contact.results.rigid_motions import UnheldMotion
 from fenics_contact.results.state import State
@@ -118,13 +119,9 @@ def _described_pair(pair: ContactPair | AnyTie, time: float) -> dict[str, Any]:
 def forces_record(state: State) -> dict[str, Any]:
     """Return reactions, forces of ties and contacts, and their balance by name. Collective."""
     pairs, balance = state.resultants(), state.balance()
-    drawn: dict[str, Any] = {"preloads": preloads_record(state)} if state.scene.preloads else {}
+    drawn: dict[str, Any] = {each.kind: each.record() for each in joint_results(state)}
     if state.scene.foundations:
         drawn["foundations"] = [_on_surface(each) for each in state.foundations()]
-    if state.scene.springs:
-        drawn["springs"] = springs_record(state)
-    if state.scene.constraints:
-        drawn["constraints"] = constraints_record(state)
     if any(pair.has_friction for pair in state.scene.contacts):
         drawn["friction"] = [_on_surface(each) for each in pairs.friction]
     return {
@@ -140,50 +137,6 @@ def forces_record(state: State) -> dict[str, Any]:
             "moment_scale": balance.moment_scale,
         },
     }
-
-
-def preloads_record(state: State) -> list[dict[str, Any]]:
-    """Return force, moments and shortening of the sections of preloads. Collective."""
-    return [
-        {
-            "name": name,
-            "axial_force": each.force,
-            "shortening": each.shortening,
-            "shear": each.shear,
-            "bending": each.bending,
-            "torsion": each.torsion,
-            "normal": each.normal,
-            **_on_surface(each.resultant),
-        }
-        for name, each in state.preloads().items()
-    ]
-
-
-def springs_record(state: State) -> list[dict[str, Any]]:
-    """Return forces and elongations of springs. Collective."""
-    return [
-        {
-            "name": name,
-            "force": each.force,
-            "directions": each.directions,
-            "tension": each.tension,
-            "elongation": each.elongation,
-        }
-        for name, each in state.springs().items()
-    ]
-
-
-def constraints_record(state: State) -> list[dict[str, Any]]:
-    """Return the forces of linear constraints on bodies. Collective."""
-    return [
-        {
-            "name": name,
-            "equations": len(each.force),
-            "largest": float(np.abs(each.force).max()),
-            "bodies": [{"body": body, "force": total} for body, total in each.on_bodies.items()],
-        }
-        for name, each in state.constraints().items()
-    ]
 
 
 def _constraint(constraint: LinearConstraint) -> dict[str, Any]:

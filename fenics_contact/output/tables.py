@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fenics_contact._base.checks import naming_arguments
-from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._base.sparse import ROUNDING, rounded
 from fenics_contact._scene.pairs import pair_number
 from fenics_contact.errors import collectively, together
 from fenics_contact.output.files import write_text
 from fenics_contact.results.area import contact_area
 from fenics_contact.results.contact import Status
 from fenics_contact.results.forces import Balance, Resultant
+from fenics_contact.results.joints import joint_results
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
@@ -258,34 +259,17 @@ class StepTable:
         reactions = state.reactions()
         found = {"loads": balance.loads, **{place: reactions[place] for place in reactions.places}}
         if state.scene.foundations:
-            springs = state.foundations()
-            found |= {f"foundation {place}": springs[place] for place in springs.places}
+            beds = state.foundations()
+            found |= {f"foundation {place}": beds[place] for place in beds.places}
         for listed in (pairs.contacts, pairs.ties):
             found |= dict(zip(_names(listed.places), listed, strict=True))
-        columns = self._springs(state, balance.force_scale) if state.scene.springs else {}
-        for name, each in state.constraints().items() if state.scene.constraints else ():
-            for body, total in each.on_bodies.items():
-                columns |= {
-                    f"constraint {name} {body} F{axis}": float(x)
-                    for axis, x in zip("xyz", rounded(total, balance.force_scale), strict=False)
-                }
+        columns: dict[str, float] = {}
+        for each in joint_results(state):
+            columns |= each.columns(balance.force_scale)
         columns |= _tools(state, balance)
         for name, part in found.items():
             self._about.setdefault(name, part.about)
             columns |= _of_resultant(name, part, balance)
-        return columns
-
-    @staticmethod
-    def _springs(state: State, scale: float) -> dict[str, float]:
-        """Return tension and elongation of springs by their columns. Collective."""
-        columns: dict[str, float] = {}
-        for name, each in state.springs().items():
-            lines = each.directions.tolist()
-            axes = [""] if len(lines) == 1 else [f" {'xyz'[line.index(1.0)]}" for line in lines]
-            tensions = rounded(each.tension, scale)
-            for axis, tension, longer in zip(axes, tensions, each.elongation, strict=True):
-                columns[f"spring {name} tension{axis}"] = float(tension)
-                columns[f"spring {name} elongation{axis}"] = float(longer)
         return columns
 
     def _text(self) -> str:
@@ -319,12 +303,6 @@ def _tools(state: State, balance: Balance) -> dict[str, float]:
         columns |= {f"tool {name} turn {axis}": float(x) for axis, x in zip(around, turns, strict=True)}
         columns |= _of_resultant(f"tool {name}", acting, balance)
     return columns
-
-
-def rounded(values: Any, scale: float) -> np.ndarray:
-    """Return numbers, shape (n,), with what is rounding of a scale set to zero."""
-    numbers = np.atleast_1d(np.asarray(values, dtype=float))
-    return np.where(np.abs(numbers) > ROUNDING * scale, numbers, 0.0)
 
 
 def _names(places: Sequence[str]) -> list[str]:

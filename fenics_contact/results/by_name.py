@@ -2,12 +2,48 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from typing import ClassVar, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
+
+import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 
+if TYPE_CHECKING:
+    from typing import Self
+
+    from fenics_contact._scene.scene import Scene
+    from fenics_contact.feti.direct import DirectSolution
+    from fenics_contact.feti.torn import TornSystem
+    from fenics_contact.qp.solution import Solution
+    from fenics_contact.results.forces import NodalForces
+
 T = TypeVar("T")
+
+
+class Solved(Protocol):
+    """What results of joints need of a state."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+
+    @property
+    def torn(self) -> TornSystem:
+        """The system of rows."""
+
+    @property
+    def solution(self) -> Solution | DirectSolution:
+        """The multipliers."""
+
+    @property
+    def torn_displacement(self) -> np.ndarray:
+        """This rank's displacement, shape (torn_size,), [length]."""
+
+    @property
+    def _nodal_forces(self) -> NodalForces:
+        """Forces by what exerts them."""
 
 
 class Labelled(Protocol):
@@ -19,7 +55,7 @@ class Labelled(Protocol):
 
 
 def names_of(parts: Sequence[Labelled]) -> list[str]:
-    """Return the names of preloads or springs, those of the same name numbered."""
+    """Return the names of parts, those of the same name numbered."""
     labels = [part.label for part in parts]
     return [
         label if labels.count(label) == 1 else f"{label} {labels[: k + 1].count(label)}"
@@ -33,6 +69,23 @@ class ByName(Mapping[str, T]):
     #: What they are of, in the plural.
     kind: ClassVar[str]
     entries: Mapping[str, T]
+
+    @classmethod
+    @abstractmethod
+    def of(cls, state: Solved) -> Self:
+        """Return those of a state. Collective."""
+
+    @abstractmethod
+    def record(self) -> list[dict[str, Any]]:
+        """Return them as entries of a result file."""
+
+    @abstractmethod
+    def columns(self, scale: float) -> dict[str, float]:
+        """Return columns of a table of load steps; forces below rounding of a scale are zero."""
+
+    @abstractmethod
+    def facts(self, force: str, length: str) -> dict[str, str]:
+        """Return each in words, with the units of force and length."""
 
     def __len__(self) -> int:
         """Return their number."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact.feti.preloads import SectionRows
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.results.by_name import ByName, names_of
-from fenics_contact.results.forces import NodalForces, Resultant, resultant
+from fenics_contact.results.by_name import ByName, Solved, names_of
+from fenics_contact.results.forces import Resultant, resultant
 
 
 @displayed
@@ -68,6 +68,48 @@ class Preloads(ByName[SectionForces]):
     kind: ClassVar[str] = "preloads"
     entries: Mapping[str, SectionForces]
 
+    @classmethod
+    def of(cls, state: Solved) -> Preloads:
+        """Return what the sections of a state transmit. Collective."""
+        scene, forces, found = state.scene, state._nodal_forces, {}
+        lengths = shortenings(state.torn, state.torn_displacement)
+        for rows in state.torn.groups.of(SectionRows):
+            named = zip(names_of(scene.preloads), scene.preloads, lengths, strict=True)
+            for number, (name, preload, length) in enumerate(named):
+                mine = rows.points.pair == number
+                places, acting = forces.places[rows.points.slave[mine]], forces.joints[rows][mine]
+                total = resultant(acting, places, places.mean(axis=0), axisymmetric=scene.axisymmetric)
+                normal = preload.normal(scene.bodies[preload.body].mesh)
+                found[name] = SectionForces(float(length), normal, total)
+        return cls(found)
+
+    def record(self) -> list[dict[str, Any]]:
+        """Return forces, moments and shortenings of sections."""
+        return [
+            {
+                "name": name,
+                "axial_force": each.force,
+                "shortening": each.shortening,
+                "shear": each.shear,
+                "bending": each.bending,
+                "torsion": each.torsion,
+                "normal": each.normal,
+                "force": each.resultant.force,
+                "moment": each.resultant.moment,
+                "about": each.resultant.about,
+            }
+            for name, each in self.items()
+        ]
+
+    def columns(self, scale: float) -> dict[str, float]:
+        """Return nothing: rows of load steps have the forces."""
+        return {}
+
+    def facts(self, force: str, length: str) -> dict[str, str]:
+        """Return forces and shortenings."""
+        words = "{0.force:.6g} {1}, shorter by {0.shortening:.6g} {2}"
+        return {f"preload {name}": words.format(each, force, length) for name, each in self.items()}
+
     def _tables(self) -> list[Table]:
         """Return a table with one line for each preload."""
         if not self.entries:
@@ -84,19 +126,6 @@ class Preloads(ByName[SectionForces]):
 
 def shortenings(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
     """Return the shortening of each preload of a torn displacement, (n_preloads,), replicated. Collective."""
-    jump, found = torn.jump(displacement), [np.zeros(0)]
-    found += [rows.lengths(torn.gathered(jump, rows)) for rows in torn.groups.of(SectionRows)]
-    return np.concatenate(found)
-
-
-def section_forces(torn: TornSystem, forces: NodalForces, displacement: np.ndarray) -> Preloads:
-    """Return what the sections transmit. Collective."""
-    scene, lengths, found = torn.scene, shortenings(torn, displacement), {}
     for rows in torn.groups.of(SectionRows):
-        for number, (name, preload) in enumerate(zip(names_of(scene.preloads), scene.preloads, strict=True)):
-            mine = rows.points.pair == number
-            places, acting = forces.places[rows.points.slave[mine]], forces.joints[rows][mine]
-            total = resultant(acting, places, places.mean(axis=0), axisymmetric=scene.axisymmetric)
-            normal = preload.normal(scene.bodies[preload.body].mesh)
-            found[name] = SectionForces(float(lengths[number]), normal, total)
-    return Preloads(found)
+        return rows.lengths(torn.gathered(torn.jump(displacement), rows))
+    return np.zeros(0)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fenics_contact._base.display import Table, displayed, tabled
-from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._base.sparse import ROUNDING, rounded
 from fenics_contact.feti.springs import SpringRows
-from fenics_contact.feti.torn import TornSystem
-from fenics_contact.results.by_name import ByName, names_of
-from fenics_contact.results.forces import NodalForces
+from fenics_contact.results.by_name import ByName, Solved, names_of
 
 
 @displayed
@@ -46,6 +44,46 @@ class SpringForces(ByName[SpringForce]):
     kind: ClassVar[str] = "springs"
     entries: Mapping[str, SpringForce]
 
+    @classmethod
+    def of(cls, state: Solved) -> SpringForces:
+        """Return what the springs of a state exert. Collective."""
+        torn, springs, found = state.torn, state.scene.springs, {}
+        for rows in torn.groups.of(SpringRows):
+            on_second = state._nodal_forces.joints[rows]
+            elongation = rows.elongation(torn.gathered(state.solution.multiplier, rows))
+            named = zip(names_of(springs), springs, strict=True)
+            for number, name in enumerate(name for name, each in named if type(each) is rows.part):
+                mine = rows.which == number
+                found[name] = SpringForce(-on_second[number], elongation[mine], rows.directions[mine])
+        return cls(found)
+
+    def record(self) -> list[dict[str, Any]]:
+        """Return forces and elongations."""
+        kinds = ("force", "directions", "tension", "elongation")
+        return [
+            {"name": name, **{kind: getattr(each, kind) for kind in kinds}} for name, each in self.items()
+        ]
+
+    def columns(self, scale: float) -> dict[str, float]:
+        """Return tensions and elongations, with the axes of springs that act along several."""
+        columns: dict[str, float] = {}
+        for name, each in self.items():
+            lines = each.directions.tolist()
+            axes = [""] if len(lines) == 1 else [f" {'xyz'[line.index(1.0)]}" for line in lines]
+            tensions = rounded(each.tension, scale)
+            for axis, tension, longer in zip(axes, tensions, each.elongation, strict=True):
+                columns[f"spring {name} tension{axis}"] = float(tension)
+                columns[f"spring {name} elongation{axis}"] = float(longer)
+        return columns
+
+    def facts(self, force: str, length: str) -> dict[str, str]:
+        """Return sizes of forces, and by how much ends move."""
+        facts = {}
+        for name, each in self.items():
+            size, longer = np.linalg.norm(each.force), np.linalg.norm(each.elongation)
+            facts[f"spring {name}"] = f"{size:.6g} {force}, ends moved by {longer:.6g} {length}"
+        return facts
+
     def _tables(self) -> list[Table]:
         """Return a table with one line for each direction of each spring."""
         if not self.entries:
@@ -59,17 +97,3 @@ class SpringForces(ByName[SpringForce]):
                     (name, along, f"{tension if abs(tension) > ROUNDING * size else 0:.5g}", f"{longer:.5g}")
                 )
         return [Table(rows, 2, ("in [force], [length]",))]
-
-
-def spring_forces(torn: TornSystem, forces: NodalForces, multiplier: np.ndarray) -> SpringForces:
-    """Return what the springs exert. Collective.
-
-    `multiplier`: λ, owned.
-    """
-    found = {}
-    for rows in torn.groups.of(SpringRows):
-        elongation = rows.elongation(torn.gathered(multiplier, rows))
-        for number, name in enumerate(names_of(torn.scene.springs)):
-            mine, on_first = rows.which == number, -forces.joints[rows][number]
-            found[name] = SpringForce(on_first, elongation[mine], rows.directions[mine])
-    return SpringForces(found)

@@ -24,7 +24,7 @@ from fenics_contact.feti.averages import nodal_mean
 from fenics_contact.feti.direct import DirectSolution
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.solution import Solution
-from fenics_contact.results.constraints import ConstraintForces, constraint_forces
+from fenics_contact.results.constraints import ConstraintForces
 from fenics_contact.results.contact import ContactResult, RowValues, Status
 from fenics_contact.results.fields import (
     GatheredFields,
@@ -50,10 +50,10 @@ from fenics_contact.results.forces import (
     pair_resultants,
     support_reactions,
 )
-from fenics_contact.results.preloads import Preloads, section_forces
+from fenics_contact.results.preloads import Preloads
 from fenics_contact.results.resolution import PeakDoubt, in_words
 from fenics_contact.results.rigid_motions import RigidMotion, UnheldMotion, rigid_motion
-from fenics_contact.results.springs import SpringForces, spring_forces
+from fenics_contact.results.springs import SpringForces
 from fenics_contact.results.tools import ToolResult, tool_results
 
 if TYPE_CHECKING:
@@ -503,7 +503,7 @@ class State(ABC):
         Example:
             >>> state.springs()["rod"].tension  # doctest: +SKIP
         """
-        return spring_forces(self.torn, self._nodal_forces, self.solution.multiplier)
+        return SpringForces.of(self)
 
     @collectively("State.constraints", comm_of)
     def constraints(self) -> ConstraintForces:
@@ -512,7 +512,7 @@ class State(ABC):
         Example:
             >>> state.constraints()["geared"].force  # doctest: +SKIP
         """
-        return constraint_forces(self.torn, self._nodal_forces)
+        return ConstraintForces.of(self)
 
     @collectively("State.preloads", comm_of)
     def preloads(self) -> Preloads:
@@ -522,7 +522,7 @@ class State(ABC):
             >>> print(state.preloads())  # doctest: +SKIP
             >>> state.preloads()["bolt"].force  # doctest: +SKIP
         """
-        return section_forces(self.torn, self._nodal_forces, self.torn_displacement)
+        return Preloads.of(self)
 
     @collectively("State.tools", comm_of)
     def tools(self) -> dict[str, ToolResult]:
