@@ -9,4 +9,10 @@ from fenics_contact.feti.springs import SpringRows
 from fenics_contact.feti.ties import BondedTies, SlidingTies
 
 #: In the order of their rows.
-JOINTS: tuple[type[Joint], ...] = (BondedTies, SectionRows, SlidingTies, SpringRows, PeriodicRows)
+JOINTS: tuple[type[Joint], ...] = (
+    BondedTies,
+    SectionRows,
+    SlidingTies,
+    SpringRows,
+    PeriodicRows,
+)
