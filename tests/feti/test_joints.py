@@ -59,8 +59,7 @@ def torn() -> TornSystem:
 @pytest.fixture(params=JOINTS, ids=lambda kind: kind.__name__)
 def joint(request: pytest.FixtureRequest, torn: TornSystem) -> Joint:
     """The joint of a kind; the scene has one of each."""
-    (found,) = torn.groups.of(request.param)
-    assert isinstance(found, Joint)
+    (found,) = (each for each in torn.groups.joints if type(each) is request.param)
     assert found.count
     return found
 
