@@ -28,10 +28,11 @@ class PeriodicRows(ConstraintRows):
     """Rows of linear constraints, which may move points of contacts and ties as others."""
 
     def once(
-        self, points: ContactPoints, scene: Scene, prescribed: np.ndarray, *, areas: bool
-    ) -> ContactPoints:
+        self, points: ContactPoints, ties: ContactPoints, scene: Scene, prescribed: np.ndarray
+    ) -> tuple[ContactPoints, ContactPoints]:
         """Return points without those that equations move as others."""
-        return once_at_periodic_edges(points, self, scene, prescribed, areas=areas)
+        ties = once_at_periodic_edges(ties, self, scene, prescribed, areas=False)
+        return once_at_periodic_edges(points, self, scene, prescribed), ties
 
 
 def once_at_periodic_edges(

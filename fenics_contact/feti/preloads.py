@@ -70,11 +70,10 @@ class SectionRows(BondedPoints):
         return Unknowns(columns, force[free] / size[free])
 
     def once(
-        self, points: ContactPoints, scene: Scene, prescribed: np.ndarray, *, areas: bool
-    ) -> ContactPoints:
+        self, points: ContactPoints, ties: ContactPoints, scene: Scene, prescribed: np.ndarray
+    ) -> tuple[ContactPoints, ContactPoints]:
         """Return the contact points, of two on both sides of a section one with the area of both."""
-        numbers = NodeNumbers.of(scene)
-        return _once_at_sections(points, scene, numbers) if areas else points
+        return _once_at_sections(points, scene, NodeNumbers.of(scene)), ties
 
     def lengths(self, jump: np.ndarray) -> np.ndarray:
         """Return the shortening of each preload for values of B u, shape (n_preloads,), [length]."""

@@ -150,13 +150,10 @@ class Joint(RowGroup):
         """
 
     def once(
-        self, points: ContactPoints, scene: Scene, prescribed: np.ndarray, *, areas: bool
-    ) -> ContactPoints:
-        """Return points without those whose rows would be the same with the joint as others'.
-
-        `areas`: whether they are contact points, which take over areas, not tied ones.
-        """
-        return points
+        self, points: ContactPoints, ties: ContactPoints, scene: Scene, prescribed: np.ndarray
+    ) -> tuple[ContactPoints, ContactPoints]:
+        """Return contact points and tied ones without those that the joint moves as others."""
+        return points, ties
 
     def check(self, scene: Scene, prescribed: np.ndarray, moving: sp.csr_matrix) -> None:
         """Reject what contradicts itself or supports; `moving`: free motions on nodes, (n_nodes · dim, n)."""

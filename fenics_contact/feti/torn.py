@@ -521,8 +521,7 @@ def _found(
     with together(decomposition.comm):
         left = ties
         for joint in found:
-            left = joint.once(left, scene, prescribed, areas=False)
-            points = joint.once(points, scene, prescribed, areas=True)
+            points, left = joint.once(points, left, scene, prescribed)
     if left is not ties:
         found = _joints(scene, decomposition, left, found)
     groups = _with_contact(scene, decomposition, found, points, prescribed)
@@ -537,7 +536,7 @@ def _joints(
     """Return the joints of a scene in the order of their rows, given those of an earlier one. Collective."""
     found: list[Joint] = []
     for kind in JOINTS:
-        found += kind.of(scene, decomposition, ties, [each for each in known if isinstance(each, kind)])
+        found += kind.of(scene, decomposition, ties, [each for each in known if type(each) is kind])
     return tuple(found)
 
 

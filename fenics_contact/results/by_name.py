@@ -13,37 +13,10 @@ from fenics_contact.errors import InvalidInputError
 if TYPE_CHECKING:
     from typing import Self
 
-    from fenics_contact._scene.scene import Scene
-    from fenics_contact.feti.direct import DirectSolution
     from fenics_contact.feti.torn import TornSystem
-    from fenics_contact.qp.solution import Solution
     from fenics_contact.results.forces import NodalForces
 
 T = TypeVar("T")
-
-
-class Solved(Protocol):
-    """What results of joints need of a state."""
-
-    @property
-    def scene(self) -> Scene:
-        """The scene."""
-
-    @property
-    def torn(self) -> TornSystem:
-        """The system of rows."""
-
-    @property
-    def solution(self) -> Solution | DirectSolution:
-        """The multipliers."""
-
-    @property
-    def torn_displacement(self) -> np.ndarray:
-        """This rank's displacement, shape (torn_size,), [length]."""
-
-    @property
-    def _nodal_forces(self) -> NodalForces:
-        """Forces by what exerts them."""
 
 
 class Labelled(Protocol):
@@ -72,8 +45,10 @@ class ByName(Mapping[str, T]):
 
     @classmethod
     @abstractmethod
-    def of(cls, state: Solved) -> Self:
-        """Return those of a state. Collective."""
+    def of(
+        cls, torn: TornSystem, forces: NodalForces, multiplier: np.ndarray, displacement: np.ndarray
+    ) -> Self:
+        """Return those of a state; multipliers are owned, displacements torn. Collective."""
 
     @abstractmethod
     def record(self) -> list[dict[str, Any]]:

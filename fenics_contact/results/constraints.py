@@ -12,7 +12,9 @@ from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import rounded
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact.feti.constraints import ConstraintRows
-from fenics_contact.results.by_name import ByName, Solved, names_of
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.by_name import ByName, names_of
+from fenics_contact.results.forces import NodalForces
 
 
 @displayed
@@ -39,12 +41,14 @@ class ConstraintForces(ByName[ConstraintForce]):
     entries: Mapping[str, ConstraintForce]
 
     @classmethod
-    def of(cls, state: Solved) -> ConstraintForces:
-        """Return what the linear constraints of a state exert. Collective."""
-        scene, numbers, found = state.scene, NodeNumbers.of(state.scene), {}
-        for rows in state.torn.groups.of(ConstraintRows):
+    def of(
+        cls, torn: TornSystem, forces: NodalForces, multiplier: np.ndarray, displacement: np.ndarray
+    ) -> ConstraintForces:
+        """Return what the linear constraints of a state exert."""
+        scene, numbers, found = torn.scene, NodeNumbers.of(torn.scene), {}
+        for rows in torn.groups.of(ConstraintRows):
             for number, name in enumerate(names_of(scene.constraints)):
-                own, on_nodes = rows.of_one(state._nodal_forces.joints[rows], number)
+                own, on_nodes = rows.of_one(forces.joints[rows], number)
                 totals = {}
                 for body in dict.fromkeys(term.body for term in scene.constraints[number].terms):
                     first = numbers.first_of(body)

@@ -12,8 +12,8 @@ from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact.feti.preloads import SectionRows
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.results.by_name import ByName, Solved, names_of
-from fenics_contact.results.forces import Resultant, resultant
+from fenics_contact.results.by_name import ByName, names_of
+from fenics_contact.results.forces import NodalForces, Resultant, resultant
 
 
 @displayed
@@ -69,11 +69,12 @@ class Preloads(ByName[SectionForces]):
     entries: Mapping[str, SectionForces]
 
     @classmethod
-    def of(cls, state: Solved) -> Preloads:
+    def of(
+        cls, torn: TornSystem, forces: NodalForces, multiplier: np.ndarray, displacement: np.ndarray
+    ) -> Preloads:
         """Return what the sections of a state transmit. Collective."""
-        scene, forces, found = state.scene, state._nodal_forces, {}
-        lengths = shortenings(state.torn, state.torn_displacement)
-        for rows in state.torn.groups.of(SectionRows):
+        scene, lengths, found = torn.scene, shortenings(torn, displacement), {}
+        for rows in torn.groups.of(SectionRows):
             named = zip(names_of(scene.preloads), scene.preloads, lengths, strict=True)
             for number, (name, preload, length) in enumerate(named):
                 mine = rows.points.pair == number

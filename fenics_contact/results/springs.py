@@ -11,7 +11,9 @@ import numpy as np
 from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import ROUNDING, rounded
 from fenics_contact.feti.springs import SpringRows
-from fenics_contact.results.by_name import ByName, Solved, names_of
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.by_name import ByName, names_of
+from fenics_contact.results.forces import NodalForces
 
 
 @displayed
@@ -45,12 +47,13 @@ class SpringForces(ByName[SpringForce]):
     entries: Mapping[str, SpringForce]
 
     @classmethod
-    def of(cls, state: Solved) -> SpringForces:
+    def of(
+        cls, torn: TornSystem, forces: NodalForces, multiplier: np.ndarray, displacement: np.ndarray
+    ) -> SpringForces:
         """Return what the springs of a state exert. Collective."""
-        torn, springs, found = state.torn, state.scene.springs, {}
+        springs, found = torn.scene.springs, {}
         for rows in torn.groups.of(SpringRows):
-            on_second = state._nodal_forces.joints[rows]
-            elongation = rows.elongation(torn.gathered(state.solution.multiplier, rows))
+            on_second, elongation = forces.joints[rows], rows.elongation(torn.gathered(multiplier, rows))
             named = zip(names_of(springs), springs, strict=True)
             for number, name in enumerate(name for name, each in named if type(each) is rows.part):
                 mine = rows.which == number

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from fenics_contact.feti.averages import nodal_mean
 from fenics_contact.feti.direct import DirectSolution
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.solution import Solution
+from fenics_contact.results.by_name import ByName
 from fenics_contact.results.constraints import ConstraintForces
 from fenics_contact.results.contact import ContactResult, RowValues, Status
 from fenics_contact.results.fields import (
@@ -163,6 +164,8 @@ def _kinds(pair: ContactPair, status: np.ndarray) -> str:
 
 #: A largest relative residual, a share of the discretisation error, or None for the default.
 Tolerance: TypeAlias = "float | BalancedTolerance | None"
+
+Joints = TypeVar("Joints", bound=ByName[Any])
 
 
 def checked_tolerance(tolerance: object) -> float | BalancedTolerance | None:
@@ -503,7 +506,7 @@ class State(ABC):
         Example:
             >>> state.springs()["rod"].tension  # doctest: +SKIP
         """
-        return SpringForces.of(self)
+        return self._of_joints(SpringForces)
 
     @collectively("State.constraints", comm_of)
     def constraints(self) -> ConstraintForces:
@@ -512,7 +515,7 @@ class State(ABC):
         Example:
             >>> state.constraints()["geared"].force  # doctest: +SKIP
         """
-        return ConstraintForces.of(self)
+        return self._of_joints(ConstraintForces)
 
     @collectively("State.preloads", comm_of)
     def preloads(self) -> Preloads:
@@ -522,7 +525,7 @@ class State(ABC):
             >>> print(state.preloads())  # doctest: +SKIP
             >>> state.preloads()["bolt"].force  # doctest: +SKIP
         """
-        return Preloads.of(self)
+        return self._of_joints(Preloads)
 
     @collectively("State.tools", comm_of)
     def tools(self) -> dict[str, ToolResult]:
@@ -562,6 +565,10 @@ class State(ABC):
     @abstractmethod
     def _least_force(self) -> float:
         """A force below which bodies count as free of forces, [force]. Collective."""
+
+    def _of_joints(self, kind: type[Joints]) -> Joints:
+        """Return the results of a kind of joints. Collective."""
+        return kind.of(self.torn, self._nodal_forces, self.solution.multiplier, self.torn_displacement)
 
     @cached_property
     def _nodal_forces(self) -> NodalForces:
