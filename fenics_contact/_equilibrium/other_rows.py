@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Rolle
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.decomposition import Decomposition, prescribed_along
+from fenics_contact.feti.joints import JOINTS
 from fenics_contact.feti.torn import TornSystem, build_torn_system, contacts_alike, with_points_inside
 from fenics_contact.results.state import State
 
@@ -99,6 +101,23 @@ def _kept(support: AnySupport, scene: Scene, before: State) -> AnySupport:
         for k, each in enumerate(support.value)
     ]
     return replace(support, value=tuple(value))
+
+
+def kept_by_joints(before: State) -> dict[str, np.ndarray]:
+    """Return what the joints of a state keep for the next load step, by name. Collective."""
+    torn, kept = before.torn, dict[str, np.ndarray]()
+    drawn = [joint for joint in torn.groups.joints if joint.draws]
+    jump = torn.jump(before.torn_displacement) if drawn else np.zeros(0)
+    for joint in drawn:
+        kept |= joint.at_end(torn.gathered(jump, joint))
+    return kept
+
+
+def continued(scene: Scene, kept: Mapping[str, np.ndarray]) -> Scene:
+    """Return the scene of a load step with what its joints have kept of the one before."""
+    for kind in JOINTS:
+        scene = kind.continued(scene, kept)
+    return scene
 
 
 def has_rows_of(state: State, after: TornSystem) -> bool:

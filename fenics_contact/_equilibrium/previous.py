@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from fenics_contact._equilibrium.carried import CarriedState
-from fenics_contact._equilibrium.other_rows import has_rows_of, on_rows_of, with_kept
+from fenics_contact._equilibrium.other_rows import (
+    continued,
+    has_rows_of,
+    kept_by_joints,
+    on_rows_of,
+    with_kept,
+)
 from fenics_contact._equilibrium.starts import CoarseStart, checked_start
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.sections import held_at
 from fenics_contact.feti.torn import TornSystem, build_torn_system, with_points_inside
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.results.dual_solve import sticking
-from fenics_contact.results.preloads import shortenings
 from fenics_contact.results.state import State, Tolerance
 
 if TYPE_CHECKING:
@@ -85,16 +89,11 @@ class Previous:
             self.before.check(scene)
 
     def kept(self, scene: Scene) -> Scene:
-        """Return a scene with what supports and bolts keep from the load step before. Collective."""
+        """Return a scene with what supports and joints keep from the load step before. Collective."""
         last = self.last
         if last is self.before:
             scene = with_kept(scene, last)
-        if not scene.preloads:
-            return scene
-        lengths = np.zeros(len(scene.preloads))
-        if last is not None and last.scene.preloads:
-            lengths = shortenings(last.torn, last.torn_displacement)
-        return replace(scene, preloads=held_at(scene, lengths))
+        return continued(scene, {} if last is None else kept_by_joints(last))
 
     def starting(
         self, scene: Scene, first: State | None, refinements: Mapping[str, Refinement] | None

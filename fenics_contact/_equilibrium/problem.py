@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -16,6 +15,7 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.linear import DirectEquilibria, LinearEquilibria, default_solver
+from fenics_contact._equilibrium.other_rows import continued
 from fenics_contact._equilibrium.previous import Equilibria, Previous, Wanted
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._equilibrium.warnings import ContactWarnings
@@ -23,7 +23,6 @@ from fenics_contact._scene.memory import Fit
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.plan import SolverKind, choose_solver
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.sections import held_at
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.same_input import check_same_input
@@ -322,8 +321,7 @@ class ContactProblem:
             InvalidInputError: If the arrays are those of another system.
         """
         scene = self.scene if scene is None else scene
-        if "lengths" in stored:
-            scene = replace(scene, preloads=held_at(scene, stored["lengths"]))
+        scene = continued(scene, stored)
         return self._equilibria(scene, sensitivity=False).restored(stored, scene, self.state)
 
 

@@ -99,7 +99,7 @@ class FrictionBySlip:
 
     def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
         """Return the coefficients."""
-        return {"coefficient": torn.friction_coefficient}
+        return {"coefficient": torn.groups.slips.coefficient}
 
     def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
         """Return the system with the coefficients as they were."""

@@ -28,7 +28,7 @@ from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.direct import DirectSolution
-from fenics_contact.feti.preloads import given_shortenings
+from fenics_contact.feti.joints import JOINTS
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
 
@@ -53,7 +53,7 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
     if not isinstance(state, LinearState):
         from fenics_contact._equilibrium.deformed import stored_deformed
 
-        return stored_deformed(cast("DeformedState", state)) | held_lengths(state.scene)
+        return stored_deformed(cast("DeformedState", state)) | stored_by_joints(state.scene)
     torn, solution = state.torn, state.dual_solution
     rows = np.arange(torn.numbering.total)
     return {
@@ -61,15 +61,15 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
         "origin": torn.numbering.gather(torn.right + torn.supported, rows),
         "slid": torn.slid,
         "motion": np.asarray(solution.alpha),
-        **held_lengths(state.scene),
+        **stored_by_joints(state.scene),
         **InFacets.of(torn.points).stored(),
         **{name: array for loop in outer_loops(state.scene) for name, array in loop.stored(torn).items()},
     }
 
 
-def held_lengths(scene: Scene) -> dict[str, np.ndarray]:
-    """Return the prescribed shortenings of the preloads of a state, at which it holds bolts, if any."""
-    return {"lengths": given_shortenings(scene)} if scene.preloads else {}
+def stored_by_joints(scene: Scene) -> dict[str, np.ndarray]:
+    """Return what of the scene of a state joints begin the next load step with."""
+    return {name: values for kind in JOINTS for name, values in kind.stored(scene).items()}
 
 
 class StepCheckpoint:

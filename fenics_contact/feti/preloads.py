@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from fenics_contact._pairing.points import (
 )
 from fenics_contact._scene.local_axes import LocalAxes, free_part
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.sections import held_at
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.row_groups import Unknowns
@@ -58,9 +59,24 @@ class SectionRows(BondedPoints):
         drawn = sp.csr_matrix(entries, shape=(len(which), len(scene.preloads)))
         return (cls(points, which, along, drawn, axes=axes),)
 
+    @classmethod
+    def stored(cls, scene: Scene) -> Mapping[str, np.ndarray]:
+        """Return the lengths at which bolts are held."""
+        return {"lengths": _given_shortenings(scene)} if scene.preloads else {}
+
+    @classmethod
+    def continued(cls, scene: Scene, kept: Mapping[str, np.ndarray]) -> Scene:
+        """Return the scene with the lengths of bolts that are held as they were, or as they were made."""
+        lengths = kept.get("lengths", np.zeros(len(scene.preloads)))
+        return replace(scene, preloads=held_at(scene, lengths)) if scene.preloads else scene
+
+    def at_end(self, jump: np.ndarray) -> Mapping[str, np.ndarray]:
+        """Return the lengths of all bolts."""
+        return {"lengths": self.lengths(jump)}
+
     def right(self, scene: Scene, prescribed: np.ndarray) -> np.ndarray:
         """Return the given shortenings along the rows, shape (n_rows,), [length]."""
-        return np.asarray(self.shortenings @ given_shortenings(scene))
+        return np.asarray(self.shortenings @ _given_shortenings(scene))
 
     def unknowns(self, scene: Scene) -> Unknowns:
         """Return the shortenings of preloads that have a force, in units of equal size over all nodes."""
@@ -124,7 +140,7 @@ def _free(scene: Scene) -> np.ndarray:
     return np.flatnonzero([preload.is_free for preload in scene.preloads])
 
 
-def given_shortenings(scene: Scene) -> np.ndarray:
+def _given_shortenings(scene: Scene) -> np.ndarray:
     """Return the prescribed shortenings, zero where a force is given and of bolts held as they were made."""
     return np.array([preload.shortening or 0.0 for preload in scene.preloads])
 

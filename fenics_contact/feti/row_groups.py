@@ -7,7 +7,7 @@ copies and what touches is in every system; what joins bodies is a `Joint`, see 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -154,6 +154,20 @@ class Joint(RowGroup):
     ) -> tuple[ContactPoints, ContactPoints]:
         """Return contact points and tied ones without those that the joint moves as others."""
         return points, ties
+
+    @classmethod
+    def stored(cls, scene: Scene) -> Mapping[str, np.ndarray]:
+        """Return what of the scene of a state the next load step begins with, by name."""
+        return {}
+
+    @classmethod
+    def continued(cls, scene: Scene, kept: Mapping[str, np.ndarray]) -> Scene:
+        """Return the scene of a load step with what is `kept` of the state before, if there is one."""
+        return scene
+
+    def at_end(self, jump: np.ndarray) -> Mapping[str, np.ndarray]:
+        """Return what the next load step begins with, by name, for B u in the rows, shape (count,)."""
+        return {}
 
     def check(self, scene: Scene, prescribed: np.ndarray, moving: sp.csr_matrix) -> None:
         """Reject what contradicts itself or supports; `moving`: free motions on nodes, (n_nodes · dim, n)."""
