@@ -260,6 +260,7 @@ def _identified(
 
     Old vertices keep their numbers, new ones follow in the order of their ends, whatever dolfinx's order is.
     """
+    points = _on_lattice(points)
     found, cells = _dolfinx.halved_simplices(points, skeleton, linear.name, chosen)
     pairs = [skeleton[:, list(pair)] for pair in zip(*np.triu_indices(len(linear.edges), 1), strict=True)]
     edges = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
@@ -267,6 +268,16 @@ def _identified(
     _, which = cKDTree(points[ends].mean(axis=1)).query(found)
     used, renumbered = np.unique(np.concatenate([np.arange(len(points)), which]), return_inverse=True)
     return ends[used], renumbered[len(points) :][cells]
+
+
+def _on_lattice(points: np.ndarray, bits: int = 40) -> np.ndarray:
+    """Return coordinates relative to the body, without their last bits.
+
+    Cells are cut by what edge is longest, and triangles by whether it is √2 times the shortest one, as in
+    half a square: rounding would decide that, in another way in other units, elsewhere, or by another BLAS.
+    """
+    low = points.min(axis=0)
+    return np.asarray(np.round((points - low) / np.ptp(points, axis=0).max() * 2.0**bits) / 2.0**bits)
 
 
 def _placed_in_parents(

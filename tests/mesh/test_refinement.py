@@ -56,6 +56,20 @@ def near(mesh: BodyMesh, reach: float) -> np.ndarray:
 ORDERS: dict[str, Callable[[BodyMesh], BodyMesh]] = {"linear": lambda mesh: mesh, "quadratic": quadratic}
 
 
+def test_halves_of_squares_are_cut_alike_in_other_units_and_elsewhere() -> None:
+    """Their edges have the ratio √2, from which on dolfinx cuts cells along their longest edge."""
+    mesh, rng, found = rectangle((0.0, 0.0), (3.0, 3.0), (3, 3), "triangle"), np.random.default_rng(2), []
+    scales, shifts = 10.0 ** rng.uniform(-9.0, 9.0, 5), rng.uniform(-3.0, 3.0, (5, 2))
+    for scale, shift in zip([1.0, *scales], [np.zeros(2), *shifts], strict=True):
+        other = BodyMesh(scale * (mesh.points + shift), mesh.cells, {})
+        for _ in range(3):
+            centres = other.points[other.cells].mean(axis=1) / scale - shift
+            other = refined(other, np.linalg.norm(centres - [2.1, 1.4], axis=1) < 1.0).mesh
+        found.append(other)
+    assert len(found[0].cells) > 3 * mesh.n_cells
+    assert all(np.array_equal(other.cells, found[0].cells) for other in found)
+
+
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_refined_meshes_conform(dim: int, order: str) -> None:
