@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -10,6 +12,7 @@ from fenics_contact import Body, ContactPair, ContactProblem, Coulomb, RigidPlan
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.qp import FaceNewton
+from fenics_contact.qp.face import Face
 from fenics_contact.results.dual_solve import solve_dual
 from fenics_contact.results.linear_state import LinearState
 from tests.contact.nested_cases import quarter_on_ball
@@ -23,20 +26,37 @@ def quarter() -> LinearState:
     return state
 
 
-@pytest.mark.parametrize("size", [1e-16, 1e-12, 1e-9, 1e-6, 1e-3, 1e-1])
-def test_friction_along_held_tangents_in_a_start_costs_hardly_a_product(
-    quarter: LinearState, size: float
-) -> None:
+def products_by_friction_along_held_tangents(quarter: LinearState, sizes: Sequence[float]) -> np.ndarray:
+    """Return the products from starts with so much of it, relative to the largest force."""
     torn, start = quarter.torn, 0.8 * quarter.solution.multiplier
     held = torn.groups.slips.held(torn.decomposition.fixed)
     rows = torn.numbering.owned_index(torn.tangential_rows.ravel()[held])
     assert len(rows) == 6
     products = []
-    for part in (0.0, size):
-        start[rows] = part * np.abs(start).max() * np.cos(np.arange(6.0))
+    for size in sizes:
+        start[rows] = size * np.abs(start).max() * np.cos(np.arange(6.0))
         products.append(solve_dual(quarter.dual, FaceNewton(1e-6, max_products=200), start).products)
-    assert 10 < products[0] < 25
-    assert products[1] <= products[0] + 10
+    return np.array(products)
+
+
+@pytest.mark.parametrize("size", [1e-16, 1e-12, 1e-9, 1e-6, 1e-3])
+def test_friction_along_held_tangents_in_a_start_costs_hardly_a_product(
+    quarter: LinearState, size: float
+) -> None:
+    without, products = products_by_friction_along_held_tangents(quarter, [0.0, size])
+    assert 10 < without < 25
+    assert products <= without + 10
+
+
+def test_more_friction_along_held_tangents_costs_less_than_where_its_discs_are_not_preconditioned(
+    quarter: LinearState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """How many steps turn that friction into slip depends on rounding: all of them are compared."""
+    sizes = [0.0, 1e-6, 1e-3, 1e-2, 3e-2, 1e-1, 2e-1]
+    products = products_by_friction_along_held_tangents(quarter, sizes)
+    monkeypatch.setattr(Face, "offset_stiffness", property(lambda face: np.zeros(face.n_face)))
+    plain = products_by_friction_along_held_tangents(quarter, sizes)
+    assert products.sum() < 0.9 * plain.sum()
 
 
 def test_points_that_slip_on_two_surfaces_at_once_cost_few_products() -> None:
