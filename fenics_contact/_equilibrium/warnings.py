@@ -30,7 +30,7 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.linear_state import LinearState
-from fenics_contact.results.resolution import BetweenNodes, PeakDoubt
+from fenics_contact.results.resolution import BetweenNodes, FacetsOutside, PeakDoubt
 from fenics_contact.results.state import State
 
 #: Errors up to this share of what moves are small.
@@ -235,7 +235,7 @@ class ContactWarnings:
         scene, comm = state.scene, state.torn.decomposition.comm
         moved = state.torn_displacement.reshape(-1, scene.components)
         reach = max(comm.allgather(float(np.linalg.norm(moved, axis=1).max(initial=0.0))))
-        near = [both for both in bodies_near(scene, reach) if both not in self._given]
+        near = bodies_near(scene, reach)
         names = sorted({name for both in near for name in both})
         displacement = {name: state.gather_displacement(name)[:, : scene.dim] for name in names}
         share = slice(comm.rank, None, comm.size)
@@ -243,9 +243,13 @@ class ContactWarnings:
             outlines = {name: self._outline(scene, name) for name in names}
             parts = [unpaired(scene, both, outlines, displacement, reach, share) for both in near]
         counts = comm.allreduce(np.array([part.counts for part in parts], dtype=int)).tolist()
+        outside = list[FacetsOutside]()
         for part, whole in zip(parts, counts, strict=True):
             if words := replace(part, counts=tuple(whole)).in_words():
                 self._log(state, part.bodies, words)
+            passing = [pair for pair in scene.contacts if whole[2] and part.is_of(pair)]
+            outside += [FacetsOutside(pair.place, whole[2]) for pair in passing]
+        object.__setattr__(state, "peak_doubts", (*state.peak_doubts, *outside))
 
     def _outline(self, scene: Scene, name: str) -> Outline:
         """Return the boundary of a body, which meshes of the same cells share."""

@@ -452,6 +452,10 @@ class Unpaired:
     paired: bool
     counts: tuple[int, int, int]
 
+    def is_of(self, pair: ContactPair) -> bool:
+        """Return whether they are the bodies of a pair."""
+        return isinstance(pair.master, Surface) and {pair.slave.body, pair.master.body} == set(self.bodies)
+
     def in_words(self, entering: str = "pass into each other") -> str:
         """Return what is wrong and what to do, or "" if nothing is."""
         touching, overlapping, entered = self.counts

@@ -162,8 +162,29 @@ class UnmatchedNodes:
         )
 
 
+@dataclass(frozen=True)
+class FacetsOutside:
+    """Facets outside the surfaces of a pair that pass into its other body, where they would press.
+
+    Attributes:
+        place: The surfaces of the pair.
+        facets: How many there are between its two bodies.
+    """
+
+    place: str
+    facets: int
+
+    def __str__(self) -> str:
+        """Return it in one line."""
+        facets = counted(self.facets, "facet passes", "facets pass")
+        return (
+            f"may be off, and so may the force: outside the surfaces of {self.place} {facets} into the other "
+            "body: name more of its facets in the pair"
+        )
+
+
 #: What is uncertain about the largest pressure of a pair.
-PeakDoubt = CoarsePeak | BetweenNodes | UnmatchedNodes
+PeakDoubt = CoarsePeak | BetweenNodes | UnmatchedNodes | FacetsOutside
 
 
 def in_words(doubts: Sequence[PeakDoubt]) -> str:

@@ -31,7 +31,7 @@ from fenics_contact._scene.choice import EXCHANGED
 from fenics_contact._scene.discretisation import keeping_discretisation
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke, PlaneStrain
-from fenics_contact.results.resolution import CALL, CornerBetweenNodes, CornerKeptAway
+from fenics_contact.results.resolution import CALL, CornerBetweenNodes, CornerKeptAway, FacetsOutside
 from tests.pairing.mortar_surfaces import lattice
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
@@ -273,12 +273,16 @@ def test_a_steep_face_alone_is_right_or_the_face_that_passes_is_named(
     """With large strains and cells small enough the other face beside the corner touches, too."""
     size = np.linalg.norm(force_on(pressed(MATERIALS["large"], "bar under", "floor y1", "node", cells)))
     caplog.clear()
-    force = force_on(pressed(MATERIALS["large"], "bar x0", "floor y1", "best", cells))
+    state = pressed(MATERIALS["large"], "bar x0", "floor y1", "best", cells)
+    force = force_on(state)
+    named = [FacetsOutside("bar x0 on floor y1", 1)] if passes else []
+    assert [each for each in state.peak_doubts if isinstance(each, FacetsOutside)] == named
     words = "bodies 'floor' and 'bar' pass into each other at 1 facet, outside the surfaces of their pairs"
     assert any(each.startswith(words) for each in caplog.messages) == passes
     if not passes:
         return require_upright(force, float(size))
     assert np.linalg.norm(force) < 0.98 * size
+    assert "outside the surfaces of bar x0 on floor y1 1 facet passes into" in str(state)
 
 
 @pytest.mark.parametrize("angle", [35.0, 45.0])
