@@ -1,37 +1,39 @@
-"""Contact pairs and ties of a deck."""
+"""What a deck says of contact pairs and ties: their surfaces and interactions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from typing import TypeAlias
 
 import numpy as np
 
-from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie
-from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
+from fenics_contact._scene.pairs import Coulomb, Surface
+from fenics_contact._scene.sectors import CyclicSymmetry
 from fenics_contact._scene.surface_laws import ClosureLaw, ClosureTable, ExponentialClosure, LinearClosure
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.readers.deck_cards import Card
-from fenics_contact.readers.deck_mesh import DeckMesh
 
 #: Keeps what is worth knowing of a card.
 Note: TypeAlias = Callable[[Card, str], None]
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Interaction:
-    """A surface interaction with the cards behind it."""
+    """A surface interaction with the cards behind it.
 
-    card: Card
-    behavior: Card | None = None
+    Attributes:
+        behavior: How surfaces press; its own card, which means hard contact, if none is given.
+    """
+
+    behavior: Card
     friction: Card | None = None
 
     @property
     def tied(self) -> bool:
         """Whether surfaces stay together."""
-        return self.behavior is not None and self.behavior.name_of("PRESSURE-OVERCLOSURE") == "TIED"
+        return self.behavior.name_of("PRESSURE-OVERCLOSURE") == "TIED"
 
 
 @dataclass(frozen=True)
@@ -88,32 +90,24 @@ class Sides:
 
 
 def read_interactions(cards: Sequence[Card]) -> dict[str, Interaction]:
-    """Return the surface interactions of a deck: their cards follow them."""
+    """Return the surface interactions of a deck before its steps: their cards follow them."""
     found: dict[str, Interaction] = {}
-    now: Interaction | None = None
-    for card in cards:
-        if card.name == "STEP":
-            break  # what steps change is another matter
+    name = ""
+    for card in takewhile(lambda card: card.name != "STEP", cards):
         if card.name == "SURFACEINTERACTION":
-            now = found[card.required("NAME")] = Interaction(card)
+            name = card.required("NAME")
+            found[name] = Interaction(card)
         elif card.name in ("SURFACEBEHAVIOR", "FRICTION"):
-            if now is None:
+            if not name:
                 raise card.error("must follow a *SURFACE INTERACTION, none is before it: add one with NAME=")
-            if card.name == "FRICTION":
-                now.friction = card
-            else:
-                now.behavior = card
+            part = "friction" if card.name == "FRICTION" else "behavior"
+            found[name] = replace(found[name], **{part: card})
     return found
 
 
 def interaction_of(card: Card, known: Mapping[str, Interaction]) -> Interaction:
     """Return the interaction that a contact pair names."""
-    name = card.required("INTERACTION")
-    if name not in known:
-        raise card.error(
-            f"surface interaction {name!r} is not there; the deck has {', '.join(known) or 'none'}"
-        )
-    return known[name]
+    return card.known("surface interaction", card.required("INTERACTION"), known)
 
 
 def read_sides(cards: Sequence[Card], known: Mapping[str, Interaction]) -> list[Sides]:
@@ -135,9 +129,9 @@ def read_sides(cards: Sequence[Card], known: Mapping[str, Interaction]) -> list[
 def closure_of(interaction: Interaction, note: Note) -> ClosureLaw | None:
     """Return how surfaces give way; None where contact is hard, which is exact here."""
     card = interaction.behavior
-    kind = "HARD" if card is None else card.name_of("PRESSURE-OVERCLOSURE") or "HARD"
-    if card is None or kind == "HARD":
-        note(interaction.card if card is None else card, "hard contact is exact, without a penalty stiffness")
+    kind = card.name_of("PRESSURE-OVERCLOSURE") or "HARD"
+    if kind == "HARD":
+        note(card, "hard contact is exact, without a penalty stiffness")
         return None
     numbers = card.all_floats()
     if kind == "LINEAR" and numbers:
@@ -165,133 +159,3 @@ def friction_of(interaction: Interaction) -> Coulomb | None:
         raise card.error("needs a friction coefficient, it has no data line: add it")
     stick = numbers[1] if len(numbers) > 1 and numbers[1] > 0 else None
     return Coulomb(numbers[0], stick_stiffness=stick) if numbers[0] > 0 else None
-
-
-def clearances(cards: Sequence[Card]) -> dict[tuple[str, str], tuple[Card, float]]:
-    """Return the clearances by slave and master."""
-    return {
-        (card.required("SLAVE"), card.required("MASTER")): (card, card.number_of("VALUE"))
-        for card in cards
-        if card.name == "CLEARANCE"
-    }
-
-
-def adjusted(
-    sides: Sequence[Sides], nodes_of: Callable[[Sides], np.ndarray], mesh: DeckMesh
-) -> dict[tuple[str, str], tuple[Card, float]]:
-    """Return no clearance of the pairs that ADJUST a set with all nodes of their slave.
-
-    `nodes_of`: returns the nodes of the slave.
-    """
-    found = {}
-    for of in sides:
-        name = of.card.parameters.get("ADJUST")
-        if of.tied or name is None or _is_number(name):
-            continue
-        chosen, own = mesh.nodes_named(name, of.card), nodes_of(of)
-        left = np.setdiff1d(own, chosen)
-        if len(left):
-            raise of.card.error(
-                f"ADJUST={name} must be a distance, or a set with all nodes of the slave, but {len(left)} of "
-                f"{len(own)} are not in it, such as {mesh.numbers[left[0]]}: add them"
-            )
-        found[of.slave, of.master] = of.card, 0.0
-    return found
-
-
-def near(one: BodyMesh, surface: str, other: BodyMesh, facing: str) -> bool:
-    """Return whether the boxes around two surfaces, half as large again, overlap."""
-    boxes = []
-    for mesh, name in ((one, surface), (other, facing)):
-        points = mesh.points[np.unique(mesh.surfaces[name])]
-        size = 0.25 * float(np.linalg.norm(np.ptp(points, axis=0)))
-        boxes.append((points.min(axis=0) - size, points.max(axis=0) + size))
-    (low, high), (below, above) = boxes
-    return bool((low <= above).all() and (below <= high).all())
-
-
-def build_pairs(
-    sides: Sequence[Sides],
-    names: Mapping[str, str],
-    meshes: Mapping[str, BodyMesh],
-    interactions: Mapping[str, Interaction],
-    given: Mapping[tuple[str, str], tuple[Card, float]],
-    alone: Mapping[str, str],
-    note: Note,
-) -> list[tuple[Sides, ContactPair | AnyTie]]:
-    """Return contact pairs and ties between bodies.
-
-    `names`: name of a surface in the deck -> that in the meshes; `alone`: name of a slave whose nodes touch
-    one by one -> that of the node set in the meshes.
-    """
-    found: list[tuple[Sides, ContactPair | AnyTie]] = []
-    for both, (card, _) in given.items():
-        if both not in {(each.slave, each.master) for each in sides if not each.tied}:
-            raise card.error(f"there is no contact pair of {both[0]} on {both[1]}: correct the names")
-    for each in sides:
-        slave, master = names[each.slave], names[each.master]
-        pairs = [
-            (Surface(a, slave), Surface(b, master))
-            for a, one in meshes.items() if slave in one.surfaces
-            for b, other in meshes.items() if master in other.surfaces
-        ]  # fmt: skip
-        if len(pairs) > 1:
-            pairs = [(s, m) for s, m in pairs if near(meshes[s.body], slave, meshes[m.body], master)]
-        for one, other in pairs:
-            twin = next((p for _, p in found if (p.slave, p.master) == (other, one)), None)
-            if twin is not None:
-                note(each.card, f"the pair {each.slave} on {each.master} is the one in the other sense, once")
-                continue
-            try:
-                made: ContactPair | AnyTie
-                if each.around is not None:
-                    made = each.around.tie(one, other, meshes)
-                elif each.tied:
-                    made = Tie(one, other)
-                else:
-                    made = _pair(one, other, each, interactions, given, alone, note)
-            except InvalidInputError as error:
-                if getattr(error, "card", ""):
-                    raise
-                raise each.card.error(str(error), each.row) from error
-            found.append((each, made))
-    return found
-
-
-def _pair(
-    slave: Surface,
-    master: Surface,
-    of: Sides,
-    interactions: Mapping[str, Interaction],
-    given: Mapping[tuple[str, str], tuple[Card, float]],
-    alone: Mapping[str, str],
-    note: Note,
-) -> ContactPair:
-    interaction, card = interaction_of(of.card, interactions), of.card
-    kind = card.name_of("TYPE") or "NODE TO SURFACE"
-    if kind not in ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR"):
-        raise card.error(f"TYPE={kind} is not read: NODE TO SURFACE, SURFACE TO SURFACE and MORTAR are")
-    adjust = card.parameters.get("ADJUST")
-    _, clearance = given.get((of.slave, of.master), (None, None))
-    if adjust is not None and not _is_number(adjust):
-        adjust = None  # a clearance of zero is given
-    by_clearance = {} if clearance is None else {"gap" if clearance >= 0 else "interference": abs(clearance)}
-    if clearance is None and adjust is None:
-        by_clearance = {"interference": "measured"}  # type: ignore[dict-item]
-    return ContactPair(
-        slave,
-        master,
-        friction_of(interaction),
-        closure=closure_of(interaction, note),
-        adjust=None if adjust is None else float(adjust),
-        nodes=alone.get(of.slave),
-        **by_clearance,  # type: ignore[arg-type]
-    )
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

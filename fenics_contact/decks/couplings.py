@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.decks.steps import DeckSteps, Instant
 from fenics_contact.readers.deck_cards import Card
-from fenics_contact.readers.deck_mesh import DeckMesh, Faces
+from fenics_contact.readers.deck_mesh import NO_NODES, DeckMesh, Faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +20,7 @@ class Driven:
 
     Attributes:
         surface: Name of the surface in the deck, or "" for nodes.
-        nodes: Its nodes, or None for those of a surface.
+        nodes: Its nodes, none for those of a surface or of elements.
         node: Position of the node whose displacements, or whose forces, are those of its point.
         turning: Position of the node whose displacements are its rotation, −1 if `node` has rotations.
         spread: Whether the surface stays flexible, and only forces are given.
@@ -29,7 +29,7 @@ class Driven:
     card: Card
     name: str
     surface: str
-    nodes: np.ndarray | None
+    nodes: np.ndarray
     node: int
     turning: int
     spread: bool
@@ -61,7 +61,7 @@ def read_driven(cards: Sequence[Card], mesh: DeckMesh) -> list[Driven]:
             surface = card.required("SURFACE")
             mesh.surface_named(surface, card)
             name = card.name_of("CONSTRAINTNAME") or surface
-            found.append(Driven(card, name, surface, None, int(node), -1, kind.name == "DISTRIBUTING"))
+            found.append(Driven(card, name, surface, NO_NODES, int(node), -1, kind.name == "DISTRIBUTING"))
     return found
 
 
@@ -111,34 +111,29 @@ def _rigid_body(card: Card, mesh: DeckMesh) -> Driven:
         name = card.name_of("NSET")
     else:
         name = card.required("ELSET")
-        nodes = None
+        nodes = NO_NODES
     node = int(mesh.nodes_named(card.required("REFNODE"), card)[0])
     turning = int(mesh.nodes_named(card.name_of("ROTNODE"), card)[0]) if card.name_of("ROTNODE") else -1
     return Driven(card, name, "", nodes, node, turning, False)
 
 
-def rigid_surface(
-    driven: Driven, body: str, surface: str, at: np.ndarray, instant: Instant | None
-) -> RigidSurface:
-    """Return the rigid surface of a node at a time, at zero before all."""
+def rigid_surface(driven: Driven, body: str, surface: str, at: np.ndarray, instant: Instant) -> RigidSurface:
+    """Return the rigid surface of a node at a time."""
     dim = len(at)
     turns = [3, 4, 5] if dim == 3 else [5]
-    held, force = np.full(6, np.nan), np.zeros(6)
-    if instant is not None:
-        held, force = driven.row(instant.held), driven.row(instant.forces)
-    motion = [None if np.isnan(value) else float(value) for value in held]
+    held, force = driven.row(instant.held), driven.row(instant.forces)
     free = np.isnan(held)
-    load = np.where(free, force, 0.0)
-    turned = tuple(motion[k] for k in turns)
-    moments = tuple(float(load[k]) for k in turns)
+    motion = [None if loose else float(value) for value, loose in zip(held, free, strict=True)]
+    load = np.where(free, force, 0.0).tolist()
+    turned, moment = tuple(motion[k] for k in turns), tuple(load[k] for k in turns)
     return RigidSurface(
         body,
         surface,
         tuple(at.tolist()),
         tuple(motion[:dim]),
         turned if dim == 3 else turned[0],
-        tuple(load[:dim].tolist()) if load[:dim].any() else None,
-        (moments if dim == 3 else moments[0]) if any(moments) else None,
+        tuple(load[:dim]) if any(load[:dim]) else None,
+        (moment if dim == 3 else moment[0]) if any(moment) else None,
     )
 
 
@@ -164,7 +159,7 @@ def read_bolts(cards: Sequence[Card], mesh: DeckMesh) -> list[Bolt]:
         if card.name == "PRE-TENSIONSECTION":
             name = card.required("SURFACE")
             given = mesh.surface_named(name, card)
-            if given.faces is None:
+            if len(given.nodes):
                 raise card.error(f"needs a surface of faces, {name!r} has nodes: give TYPE=ELEMENT")
             node = int(mesh.nodes_named(card.required("NODE"), card)[0])
             found.append(Bolt(card, name, given.faces, node, _sense(card, mesh, given.faces)))
@@ -183,66 +178,13 @@ def _sense(card: Card, mesh: DeckMesh, faces: Faces) -> float:
     return -1.0 if np.array([*card.floats(0), 0.0, 0.0, 0.0])[:3] @ outward < 0.0 else 1.0
 
 
-def drawn(bolt: Bolt, held: Preload, instant: Instant, before: Instant | None) -> Preload | None:
-    """Return how a bolt is drawn in a step, None where it is held at its length."""
+def drawn(bolt: Bolt, held: Preload, instant: Instant, before: Instant) -> Iterator[Preload]:
+    """Yield how a bolt is drawn at a time, nothing where it is held at its length."""
     shortening, force = instant.held[bolt.node, 0], instant.forces[bolt.node, 0]
-    if not np.isnan(shortening):
-        same = before is not None and before.held[bolt.node, 0] == shortening
-        if same or instant.fixed[bolt.node, 0]:
-            return None
-        drawn = bolt.sense * float(shortening)
-        return Preload(held.body, held.section, shortening=drawn, name=held.name)
-    return Preload(held.body, held.section, force=bolt.sense * float(force), name=held.name)
-
-
-@dataclass(frozen=True, eq=False)
-class Equation:
-    """A linear equation between components of nodes, Σ c u = 0.
-
-    Attributes:
-        nodes: Positions of the nodes of its terms.
-        components: Their components, from zero.
-        factors: Their factors.
-    """
-
-    card: Card
-    row: int
-    nodes: tuple[int, ...]
-    components: tuple[int, ...]
-    factors: tuple[float, ...]
-
-
-def read_equations(cards: Sequence[Card], mesh: DeckMesh) -> list[Equation]:
-    """Return the equations of a deck."""
-    found = []
-    for card in cards:
-        if card.name != "EQUATION":
-            continue
-        if "REMOVE" in card.parameters:
-            raise card.error("REMOVE is not read: leave the equation out")
-        row = 0
-        while row < len(card.rows):
-            first, count = row, card.whole(card.rows[row][0], row)
-            if count < 1:
-                raise card.error(f"needs the number of its terms, got {card.rows[row][0]!r}: correct it", row)
-            entries: list[str] = []
-            while len(entries) < 3 * count:
-                row += 1
-                if row == len(card.rows):
-                    raise card.error(
-                        f"needs {count} terms of node, component and factor: complete them", first
-                    )
-                entries += [entry for entry in card.rows[row] if entry]
-            nodes = [mesh.nodes_named(token, card, row) for token in entries[: 3 * count : 3]]
-            if any(len(each) != 1 for each in nodes):
-                raise card.error("needs single nodes, got a set of several: write an equation for each", row)
-            numbers = [card.number(token, row) for token in entries[2 : 3 * count : 3]]
-            parts = [card.whole(token, row) - 1 for token in entries[1 : 3 * count : 3]]
-            if not all(0 <= part < 6 for part in parts):
-                raise card.error(f"components must be from 1 to 6, got {1 + min(parts)}: correct them", row)
-            found.append(Equation(card, first, tuple(int(n[0]) for n in nodes), tuple(parts), tuple(numbers)))
-            row += 1
-    return found
+    if np.isnan(shortening):
+        yield replace(held, force=bolt.sense * float(force))
+    elif before.held[bolt.node, 0] != shortening and not instant.fixed[bolt.node, 0]:
+        yield replace(held, shortening=bolt.sense * float(shortening))
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,19 +192,41 @@ class LocalAxes:
     """Axes of some nodes along which components are counted.
 
     Attributes:
-        nodes: Positions of the nodes.
-        axes: Their axes as rows, (n, 3, 3).
-        card: The card, and a constant part of the axes: 0 to 2 for all nodes alike, else only the third.
+        rows: Position of a node -> its axes as rows, (3, 3).
+        on_axis: Cards of cylinders, and nodes on the axis, where no direction is the radial one.
     """
 
-    nodes: np.ndarray
-    axes: np.ndarray
-    card: Card
+    mesh: DeckMesh
+    rows: Mapping[int, np.ndarray]
+    on_axis: Sequence[tuple[Card, np.ndarray]]
+
+    def turned(self, nodes: np.ndarray) -> np.ndarray:
+        """Return which nodes have axes of their own, (n,)."""
+        return np.isin(nodes, np.fromiter(self.rows, dtype=np.int64))
+
+    def of(self, node: int) -> np.ndarray:
+        """Return the axes of a node as rows."""
+        return self.rows.get(node, np.eye(3))
+
+    def check(self, steps: DeckSteps) -> None:
+        """Reject nodes on the axis of a cylinder that are held or loaded along one direction across it."""
+        for card, nodes in self.on_axis:
+            for instant in steps.instants:
+                held, force = instant.held[nodes, :2], instant.forces[nodes, :2]
+                wrong = np.isnan(held[:, 0]) != np.isnan(held[:, 1])
+                wrong |= np.nan_to_num(held).any(axis=1) | force.any(axis=1)
+                if wrong.any():
+                    raise card.error(
+                        f"node {self.mesh.numbers[nodes[wrong][0]]} is on the axis of the cylinder, where no "
+                        "direction is the radial one, but it is held or loaded along component 1 or 2: hold "
+                        "both at zero there, or leave it out of the set"
+                    )
 
 
-def read_axes(cards: Sequence[Card], mesh: DeckMesh, steps: DeckSteps) -> dict[int, np.ndarray]:
-    """Return the local axes of nodes by their positions, as rows."""
+def read_axes(cards: Sequence[Card], mesh: DeckMesh) -> LocalAxes:
+    """Return the local axes of nodes."""
     found: dict[int, np.ndarray] = {}
+    on_axis = []
     for card in cards:
         if card.name != "TRANSFORM":
             continue
@@ -272,37 +236,21 @@ def read_axes(cards: Sequence[Card], mesh: DeckMesh, steps: DeckSteps) -> dict[i
         if kind not in ("R", "C") or len(numbers) < 6:
             raise card.error("needs TYPE=R or C and a line with two points: complete it")
         first, second = np.array(numbers[:3]), np.array(numbers[3:6])
-        points = mesh.points[nodes]
         if kind == "R":
             axes = np.tile(_frame(first, second), (len(nodes), 1, 1))
         else:
             along = (second - first) / np.linalg.norm(second - first)
-            arms = points - first
+            arms = mesh.points[nodes] - first
             out = arms - np.outer(arms @ along, along)
             size = np.linalg.norm(out, axis=1)
-            # On the axis no direction is the radial one: any serves where both across it are held alike.
-            on_axis = size <= 1e-9 * np.abs(arms).max()
-            _check_on_axis(nodes[on_axis], card, mesh, steps)
-            out[on_axis] = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+            # On the axis any direction serves as the radial one where both across it are held alike.
+            near = size <= 1e-9 * np.abs(arms).max()
+            on_axis.append((card, nodes[near]))
+            out[near] = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
             out /= np.linalg.norm(out, axis=1)[:, None]
             axes = np.stack([out, np.cross(along, out), np.tile(along, (len(nodes), 1))], axis=1)
         found.update(zip(nodes.tolist(), axes, strict=True))
-    return found
-
-
-def _check_on_axis(nodes: np.ndarray, card: Card, mesh: DeckMesh, steps: DeckSteps) -> None:
-    """Reject nodes on the axis of a cylinder that are held or loaded along one direction across it."""
-    for step in steps.steps:
-        for instant in step.instants:
-            held, force = instant.held[nodes, :2], instant.forces[nodes, :2]
-            wrong = np.isnan(held[:, 0]) != np.isnan(held[:, 1])
-            wrong |= np.nan_to_num(held).any(axis=1) | force.any(axis=1)
-            if wrong.any():
-                raise card.error(
-                    f"node {mesh.numbers[nodes[wrong][0]]} is on the axis of the cylinder, where no "
-                    "direction is the radial one, but it is held or loaded along component 1 or 2: hold "
-                    "both at zero there, or leave it out of the set"
-                )
+    return LocalAxes(mesh, found, on_axis)
 
 
 def _frame(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ class TensorGiven:
     """Initial stresses, or plastic strains, of elements.
 
     Attributes:
-        card: The last card that gives some.
+        card: The last card that gives some, that of the first elements if none does.
         values: By element, xx, yy, zz, yz, xz, xy, (n_elements, 6), zero where none is given.
     """
 
@@ -29,16 +29,14 @@ class TensorGiven:
 
 
 def read_initial(
-    cards: Sequence[Card], mesh: DeckMesh, note: Callable[[Card, str], None], kind: str = "STRESS"
-) -> TensorGiven | None:
-    """Return the initial stresses, or the PLASTICSTRAIN, of a deck, None without any.
+    cards: Sequence[Card], mesh: DeckMesh, note: Callable[[Card, str], None], kind: str
+) -> TensorGiven:
+    """Return the initial STRESS, or the PLASTICSTRAIN, of the elements of a deck.
 
     Lines of eight entries have an element, an integration point and six components, as in CalculiX; others an
     element or a set and its components, as in Abaqus. Elements have the mean of their points.
     """
     mine = [each for each in cards if each.name == "INITIALCONDITIONS" and kind_of(each) == kind]
-    if not mine:
-        return None
     stress = np.zeros((len(mesh.element_numbers), 6))
     for card in mine:
         widths = {len(entries) for entries in card.rows}
@@ -57,7 +55,7 @@ def read_initial(
                 values = np.zeros(6)
                 values[_IN_VOIGT[: len(numbers)]] = numbers
                 stress[mesh.elements_named(entries[0], card, row)] = values
-    return TensorGiven(mine[-1], stress)
+    return TensorGiven([mesh.blocks[0].card, *mine][-1], stress)
 
 
 def kind_of(card: Card) -> str:

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from fenics_contact.decks.couplings import Equation
+from fenics_contact.decks.equations import Equation
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import DeckMesh
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fenics_contact._scene.pairs import ContactPair
-from fenics_contact.decks.contact import Interaction, Note, Sides, closure_of, friction_of
+from fenics_contact.decks.contact import Interaction, Note, Sides, closure_of, friction_of, interaction_of
 from fenics_contact.readers.deck_cards import Card
 
 #: Cards that say whose cards follow.
@@ -27,13 +27,12 @@ class PairChange:
     known: frozenset[tuple[str, str]]
     removed: frozenset[tuple[str, str]] = frozenset()
 
-    def applied(self, of: Sides, pair: ContactPair, note: Note) -> ContactPair | None:
-        """Return a pair as it is in the step, None where it does not act."""
+    def applied(self, of: Sides, pair: ContactPair, note: Note) -> Iterator[ContactPair]:
+        """Yield a pair as it is in the step, nothing where it does not act."""
         # A pair that is there in both senses is one here.
-        if {(of.slave, of.master), (of.master, of.slave)} & self.known <= self.removed:
-            return None
-        interaction = self.interactions[of.card.name_of("INTERACTION")]
-        return replace(pair, friction=friction_of(interaction), closure=closure_of(interaction, note))
+        if not {(of.slave, of.master), (of.master, of.slave)} & self.known <= self.removed:
+            interaction = self.interactions[of.card.name_of("INTERACTION")]
+            yield replace(pair, friction=friction_of(interaction), closure=closure_of(interaction, note))
 
 
 def read_changes(
@@ -53,11 +52,7 @@ def read_changes(
                 raise card.error("must be between *STEP and *END STEP: move it there")
             continue
         if card.name in _CHANGES:
-            name = card.required("INTERACTION")
-            if name not in now.interactions:
-                there = ", ".join(now.interactions) or "none"
-                raise card.error(f"surface interaction {name!r} is not there; the deck has {there}")
-            at = card, now.interactions[name]
+            at = card, interaction_of(card, now.interactions)
             continue
         if card.name == "MODELCHANGE":
             now = replace(now, removed=_switched(card, now))

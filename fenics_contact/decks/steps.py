@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from fenics_contact.decks.equations import Equation
 from fenics_contact.decks.initial_stress import kind_of
 from fenics_contact.decks.vocabulary import PRINT_CARDS, PROCEDURES
 from fenics_contact.readers.deck_cards import Card, DeckError, plain
@@ -57,10 +58,7 @@ class Amplitudes:
             if delay:
                 raise card.error("TIME DELAY needs an AMPLITUDE, there is none: add it, or leave it out")
             return 0
-        if name not in self.known:
-            raise card.error(
-                f"amplitude {name!r} is not there; the deck has {', '.join(self.known) or 'none'}"
-            )
+        card.known("amplitude", name, self.known)
         return 1 + list(self.numbered).index((name, delay))
 
     def factors(self, step_time: float, total_time: float) -> np.ndarray:
@@ -349,12 +347,16 @@ class DeckSteps:
         targets: What is held, in the order of the deck, before and in all steps.
         prints: Cards that ask for results, with the number of their step.
         initial: Temperatures of nodes before all steps, (n_nodes,).
+        at_rest: What is held in the first step, or without any, all at zero.
+        equations: Equations between components of nodes.
     """
 
     steps: Sequence[Step]
     targets: Sequence[Held]
     prints: Sequence[tuple[int, Card]]
     initial: np.ndarray
+    at_rest: Instant
+    equations: Sequence[Equation] = ()
 
     @cached_property
     def instants(self) -> Sequence[Instant]:
@@ -365,6 +367,16 @@ class DeckSteps:
     def large(self) -> bool:
         """Whether any step has NLGEOM."""
         return any(step.large for step in self.steps)
+
+    def with_forces(
+        self, change: Callable[[np.ndarray], np.ndarray], equations: Sequence[Equation]
+    ) -> DeckSteps:
+        """Return the steps with other forces on nodes, (n_nodes, 6), and with equations."""
+        steps = [
+            replace(step, instants=[replace(each, forces=change(each.forces)) for each in step.instants])
+            for step in self.steps
+        ]
+        return replace(self, steps=steps, equations=equations)
 
 
 def read_steps(cards: Sequence[Card], mesh: DeckMesh) -> DeckSteps:
@@ -384,7 +396,9 @@ def read_steps(cards: Sequence[Card], mesh: DeckMesh) -> DeckSteps:
             prints += [(len(steps), each) for each in group if each.name in PRINT_CARDS]
             steps.append(_step(group, state, amplitudes, reached.time, steps))
             reached = steps[-1].instants[-1]
-    return DeckSteps(steps, targets, prints, initial)
+    first = steps[0].instants[0] if steps else state.at(Clock(0.0, 0.0, amplitudes.factors(0.0, 0.0)))
+    rest = replace(Instant.rest(initial), held=np.where(np.isnan(first.held), np.nan, 0.0))
+    return DeckSteps(steps, targets, prints, initial, rest)
 
 
 def _groups(cards: Sequence[Card]) -> Iterator[list[Card]]:

@@ -69,13 +69,12 @@ def reach_of(card: Card, mesh: DeckMesh, slave: Faces, master: Faces, share: flo
     ]
     given = card.number_of("POSITIONTOLERANCE")
     tolerance = given if given >= 1e-10 else share * float(np.concatenate(edges).mean())
-    parts = list(mesh.parts_of(slave))
-    nodes = np.unique(np.concatenate([members.ravel() for _, _, _, members in parts]))
+    nodes = mesh.nodes_of(slave)
     away = _distances(mesh.points[nodes], _triangles(mesh, master))
     far = np.zeros(len(mesh.points))
     far[nodes] = away
     worst = np.zeros(len(slave))
-    for mine, _, _, members in parts:
+    for mine, _, _, members in mesh.parts_of(slave):
         worst[mine] = far[members].max(axis=1)
     tied = worst <= tolerance
     return Reach(slave, tied, nodes[away > tolerance], float(worst[tied].max(initial=0.0)), tolerance)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -19,7 +20,7 @@ from fenics_contact.mesh.quality import AT_GAUSS_POINTS, jacobians, thickness
 from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, one_array
 from fenics_contact.readers.deck_assembly import read_cards
 from fenics_contact.readers.deck_cards import Card
-from fenics_contact.readers.deck_mesh import Block, DeckMesh, Faces, Named, read_mesh_cards
+from fenics_contact.readers.deck_mesh import NO_FACES, Block, DeckMesh, Faces, Named, read_mesh_cards
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -162,15 +163,14 @@ class Exterior:
         near = mark[self.nodes].any(axis=1)
         return Faces(self.faces.elements[near], self.faces.sides[near])
 
-    def faces_of(self, surface: Named) -> Faces | None:
-        """Return the faces of a surface, of one of nodes those that have all of them, or None."""
-        return surface.faces if surface.nodes is None else self.covering(surface.nodes)
+    def faces_of(self, surface: Named) -> Faces:
+        """Return the faces of a surface, of one of nodes those that have all of them, if there are any."""
+        return self.covering(surface.nodes) if len(surface.nodes) else surface.faces
 
-    def covering(self, nodes: np.ndarray) -> Faces | None:
-        """Return faces that have these nodes and no others, None if there are none."""
+    def covering(self, nodes: np.ndarray) -> Faces:
+        """Return faces that have these nodes and no others, if there are any."""
         inside = self.within(nodes)
-        mine = np.concatenate([part.ravel() for _, _, _, part in self.mesh.parts_of(inside)] or [nodes[:0]])
-        return inside if len(nodes) and np.array_equal(np.unique(mine), np.unique(nodes)) else None
+        return inside if np.array_equal(self.mesh.nodes_of(inside), np.unique(nodes)) else NO_FACES
 
 
 def _every_face(mesh: DeckMesh) -> tuple[Faces, np.ndarray, np.ndarray]:
@@ -199,9 +199,37 @@ class Parts:
         nodes: Name -> positions in the deck of the nodes of its mesh, −1 for nodes that the deck has not.
     """
 
-    components: Sequence[Component]
     meshes: Mapping[str, BodyMesh]
     nodes: Mapping[str, np.ndarray]
+
+    def within(self, name: str, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return which nodes of the deck a body has, and their numbers in it."""
+        mine = self.nodes[name]
+        mine = mine[mine >= 0]  # ascending; centres of cells are behind
+        place = np.minimum(np.searchsorted(mine, nodes), len(mine) - 1)
+        there = mine[place] == nodes
+        return nodes[there], place[there]
+
+    @cached_property
+    def _owner(self) -> np.ndarray:
+        """Number of the first body that has a node, −1 of nodes without elements."""
+        found = np.full(1 + max(int(nodes.max()) for nodes in self.nodes.values()), -1)
+        for number, nodes in reversed(list(enumerate(self.nodes.values()))):
+            found[nodes[nodes >= 0]] = number
+        return found
+
+    def owned(self, name: str, nodes: np.ndarray) -> np.ndarray:
+        """Return which nodes of a body no body before it has."""
+        return np.asarray(self._owner[nodes] == list(self.nodes).index(name))
+
+    def joints(self) -> Iterator[tuple[str, str, np.ndarray]]:
+        """Yield pairs of bodies and the nodes that they share: the second is not the first with these."""
+        names = list(self.nodes)
+        for number, (name, nodes) in enumerate(self.nodes.items()):
+            mine = nodes[nodes >= 0]
+            of = self._owner[mine]
+            for first in np.unique(of[of != number]):
+                yield names[first], name, mine[of == first]
 
 
 def build_bodies(
@@ -255,7 +283,7 @@ def build_bodies(
         mine = np.unique(np.concatenate([row.ravel() for row in rows]))
         centres = meshes[part.name].n_nodes - len(mine)  # after all others
         nodes[part.name] = np.append(mine, np.full(centres, -1))
-    return Parts(parts, meshes, nodes)
+    return Parts(meshes, nodes)
 
 
 def _cells(mesh: DeckMesh, points: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -363,7 +391,7 @@ def _read(path: Path) -> dict[str, BodyMesh]:
     surfaces = {}
     for name, given in mesh.surfaces.items():
         faces = exterior.faces_of(given)
-        if faces is not None and len(faces) and exterior.holds(faces).all():
+        if len(faces) and exterior.holds(faces).all():
             surfaces[name] = faces
     parts = components(mesh, sections, of_element)
     sets = {name: nodes for name, nodes in mesh.node_sets.items() if name not in surfaces}

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from fenics_contact.errors import InvalidInputError
 
 #: Largest number of a node or element, as in the other programs.
 MOST_NUMBERS = 2**31 - 1
+T = TypeVar("T")
 
 
 class DeckError(InvalidInputError):
@@ -128,6 +131,15 @@ class Card:
             return self.origin.error(words)
         origin = replace(self.origin, file=self.files[row]) if self.files else self.origin
         return origin.error(words, self.numbers[row])
+
+    def known(self, what: str, name: str, named: Mapping[str, T], row: int | None = None) -> T:
+        """Return what has a name, which must be there."""
+        if name not in named:
+            close = get_close_matches(name, list(named), n=1, cutoff=0.6)
+            hint = f"did you mean {close[0]}? " if close else ""
+            there = ", ".join(sorted(named)[:8]) + (", ..." if len(named) > 8 else "")
+            raise self.error(f"{what} {name!r} is not there; {hint}the deck has {there or 'none'}", row)
+        return named[name]
 
     def name_of(self, parameter: str) -> str:
         """Return the name that a parameter gives, in capitals, "" without it."""

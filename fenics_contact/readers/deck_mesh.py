@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
-from typing import TypeVar
 
 import numpy as np
 
@@ -43,21 +41,17 @@ class Faces:
         return len(self.elements)
 
 
-NO_FACES = Faces(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+NO_NODES = np.zeros(0, dtype=np.int64)
+NO_FACES = Faces(NO_NODES, NO_NODES)
 
 
 @dataclass(frozen=True, eq=False)
 class Named:
-    """A surface by its card: faces of elements, or nodes."""
+    """A surface by its card: faces of elements, or nodes; none of both where its card has no lines."""
 
     card: Card
-    faces: Faces | None
-    nodes: np.ndarray | None
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether its card has no lines, as of surfaces that nothing uses."""
-        return not (self.faces if self.nodes is None else self.nodes.tolist())
+    faces: Faces
+    nodes: np.ndarray
 
 
 @dataclass(eq=False)
@@ -102,18 +96,18 @@ class DeckMesh:
             if place < len(self.numbers) and self.numbers[place] == number:
                 return np.array([place])
             return self.positions(np.array([number]), "node", card, row)
-        return _known(self.node_sets, token, "node set", card, row)
+        return card.known("node set", plain(token), self.node_sets, row)
 
     def elements_named(self, token: str, card: Card, row: int | None = None) -> np.ndarray:
         """Return the positions of the elements of a set, or of one element by its number."""
         if token.isdecimal():
             return self.positions(np.array([_written(token)]), "element", card, row)
-        return _known(self.element_sets, token, "element set", card, row)
+        return card.known("element set", plain(token), self.element_sets, row)
 
     def surface_named(self, token: str, card: Card, row: int | None = None) -> Named:
         """Return a surface, which has faces or nodes."""
-        found = _known(self.surfaces, token, "surface", card, row)
-        if found.is_empty:
+        found = card.known("surface", plain(token), self.surfaces, row)
+        if not len(found.faces) and not len(found.nodes):
             raise card.error(f"surface {plain(token)!r} has no lines: add its faces or nodes", row)
         return found
 
@@ -139,6 +133,23 @@ class DeckMesh:
     def corners(self, faces: Faces) -> list[np.ndarray]:
         """Return the corners of faces, arrays of (n, 4 | 3 | 2) positions of nodes."""
         return [nodes[:, : len(element.faces[side])] for _, element, side, nodes in self.parts_of(faces)]
+
+    def nodes_of(self, faces: Faces) -> np.ndarray:
+        """Return the ascending positions of the nodes of faces."""
+        return np.unique(np.concatenate([NO_NODES, *(n.ravel() for _, _, _, n in self.parts_of(faces))]))
+
+    def in_cell_order(self, elements: np.ndarray) -> np.ndarray:
+        """Return the elements of a body in the order of its cells: type by type, by their names."""
+        kinds = np.array([block.element.cell for block in self.blocks])[self.block_of]
+        return elements[np.argsort(kinds[elements], kind="stable")]
+
+    def middles(self, elements: np.ndarray) -> np.ndarray:
+        """Return the mean of the nodes of elements, (n, 3)."""
+        block_of, found = self.block_of, np.zeros((len(elements), 3))
+        for number in np.unique(block_of[elements]):
+            block, mine = self.blocks[number], block_of[elements] == number
+            found[mine] = self.points[block.nodes[elements[mine] - block.first]].mean(axis=1)
+        return found
 
     def parts_of(self, faces: Faces) -> Iterator[tuple[np.ndarray, Element, int, np.ndarray]]:
         """Yield faces of one type and side: their positions, the type, the side and their nodes."""
@@ -182,22 +193,10 @@ def _written(token: str) -> int:
     return min(int(token[:20]), np.iinfo(np.int64).max)
 
 
-T = TypeVar("T")
-
-
-def _known(named: Mapping[str, T], token: str, what: str, card: Card, row: int | None) -> T:
-    name = plain(token)
-    if name not in named:
-        close = get_close_matches(name, list(named), n=1, cutoff=0.6)
-        hint = f"did you mean {close[0]}? " if close else ""
-        there = ", ".join(sorted(named)[:8]) + (", ..." if len(named) > 8 else "")
-        raise card.error(f"{what} {name!r} is not there; {hint}the deck has {there or 'none'}", row)
-    return named[name]
-
-
 def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
     """Return nodes, elements, sets and surfaces of a deck."""
-    numbers, points, numbers_of = _nodes([card for card in cards if card.name == "NODE"])
+    with_nodes = [card for card in cards if card.name == "NODE"]
+    numbers, points, numbers_of = _nodes(with_nodes)
     mesh = DeckMesh(numbers, points, [], np.zeros(0, dtype=np.int64))
     coupling = [card for card in cards if card.name == "ELEMENT" and card.name_of("TYPE") == "DCOUP3D"]
     for card in coupling:
@@ -205,16 +204,11 @@ def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
         mesh.couplings[card.required("ELSET")] = nodes
     cards = [card for card in cards if card not in coupling]
     _elements(mesh, [card for card in cards if card.name == "ELEMENT"])
+    for card, own in zip(with_nodes, numbers_of, strict=True):
+        if card.name_of("NSET"):
+            _add(mesh, mesh.node_sets, card, card.name_of("NSET"), mesh.positions(own, "node", card))
     for card in cards:
-        if card.name == "NODE" and card.name_of("NSET"):
-            _add(
-                mesh,
-                mesh.node_sets,
-                card,
-                card.name_of("NSET"),
-                mesh.positions(numbers_of[id(card)], "node", card),
-            )
-        elif card.name == "ELEMENT" and card.name_of("ELSET"):
+        if card.name == "ELEMENT" and card.name_of("ELSET"):
             blocks = [block for block in mesh.blocks if block.card is card]
             first, last = blocks[0].first, blocks[-1].first + len(blocks[-1].numbers)
             _add(mesh, mesh.element_sets, card, card.name_of("ELSET"), np.arange(first, last))
@@ -228,22 +222,21 @@ def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
     return mesh
 
 
-def _nodes(cards: Sequence[Card]) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
+def _nodes(cards: Sequence[Card]) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Return numbers and coordinates of all nodes, and the numbers of each card."""
     if not cards:
         raise DeckError("a deck must have nodes, under *NODE; it has none")
-    tables = {}
+    tables = []
     for card in cards:
         if card.name_of("SYSTEM") not in ("", "R"):
             raise card.error(f"SYSTEM={card.name_of('SYSTEM')} is not read: give coordinates x, y and z")
         if not card.lines:
             raise card.error("needs nodes, it has no data lines: add them, or leave the card out")
-        tables[id(card)] = card.table(4)
-    every = np.concatenate(list(tables.values()))
+        tables.append(card.table(4))
+    own = [card.wholes(table[:, 0]) for card, table in zip(cards, tables, strict=True)]
     # The last definition of a node counts.
-    own = {id(card): card.wholes(tables[id(card)][:, 0]) for card in cards}
-    numbers, last = np.unique(np.concatenate(list(own.values()))[::-1], return_index=True)
-    return numbers, every[::-1][last, 1:], own
+    numbers, last = np.unique(np.concatenate(own)[::-1], return_index=True)
+    return numbers, np.concatenate(tables)[::-1][last, 1:], own
 
 
 def _elements(mesh: DeckMesh, cards: Sequence[Card]) -> None:
@@ -327,7 +320,7 @@ def _surface(mesh: DeckMesh, card: Card) -> Named:
     kind = card.name_of("TYPE") or "ELEMENT"
     if kind == "NODE":
         found = [mesh.nodes_named(row[0], card, k) for k, row in enumerate(card.rows)]
-        return Named(card, None, np.unique(np.concatenate(found)) if found else np.zeros(0, dtype=np.int64))
+        return Named(card, NO_FACES, np.unique(np.concatenate([NO_NODES, *found])))
     if kind != "ELEMENT":
         raise card.error(f"TYPE must be ELEMENT or NODE, got {kind}: give faces of elements, or nodes")
     parts = []
@@ -339,7 +332,7 @@ def _surface(mesh: DeckMesh, card: Card) -> Named:
                 f"needs a face S1, S2, ... behind the elements, got {label or 'nothing'!r}: add it", k
             )
         parts.append(mesh.faces_of(elements, label, card, k))
-    return Named(card, joined(parts), None)
+    return Named(card, joined(parts), NO_NODES)
 
 
 def joined(parts: Iterable[Faces]) -> Faces:

@@ -107,7 +107,7 @@ def test_the_leading_static_steps_alone_are_read_if_that_is_wanted(others: str, 
     assert words.endswith("this step and all behind it are left out: they are no statics")
     line = text.count("\n") + (1 if "PERTURBATION" in others else 4)
     assert f"model.inp line {line}: this step" in words
-    with pytest.raises(DeckError, match=r"the first step is no statics, so that nothing of it is left"):
+    with pytest.raises(DeckError, match=r"the first step is not static: nothing remains"):
         read_deck(deck(tmp_path, BAR + FREE_TO_CONTRACT + others, "none.inp"), statics_only=True)
 
 
