@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.display import displayed
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.local_axes import LocalAxes, free_part
@@ -19,11 +19,11 @@ from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tresca
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import together
-from fenics_contact.errors.kinds import safe_log
 from fenics_contact.mesh.faces import corners_of, match_faces
 from fenics_contact.qp.cones import Strengths
 
 if TYPE_CHECKING:
+    from fenics_contact._pairing.advice import Advice
     from fenics_contact.qp.compliance import Closures
 
 Law = TypeVar("Law")
@@ -498,9 +498,9 @@ def without_tied(
     ties: ContactPoints,
     scene: Scene,
     fixed: np.ndarray,
-    axes: LocalAxes | None = None,
-    *,
-    told: bool,
+    axes: LocalAxes | None,
+    advice: Advice,
+    comm: MPI.Comm,
 ) -> ContactPoints:
     """Return the contact points that no tie has as well.
 
@@ -510,9 +510,8 @@ def without_tied(
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
     """
     point, tied = _tied(points, ties, scene, fixed, axes)
-    if not told:
-        words = "the contact of %s leaves out %s, where the force is that of %s, which ties the same places"
-        _tell(words, (scene.contacts, points, point), (scene.ties, ties, tied))
+    words = "the contact of %s leaves out %s, where the force is that of %s, which ties the same places"
+    advice.left_out(words, (scene.contacts, points, point), (scene.ties, ties, tied), comm)
     return points.part(np.setdiff1d(np.arange(points.count), point))
 
 
@@ -543,7 +542,7 @@ def tied_once(
     return ties.part(np.setdiff1d(np.arange(ties.count), lost))
 
 
-def shared_once(points: ContactPoints, scene: Scene, *, told: bool) -> ContactPoints:
+def shared_once(points: ContactPoints, scene: Scene, advice: Advice, comm: MPI.Comm) -> ContactPoints:
     """Return the contact points, of those that compare the same places in one direction only one.
 
     Where an edge belongs to two contact pairs, or two pairs have the same surfaces, their normal forces would
@@ -551,9 +550,8 @@ def shared_once(points: ContactPoints, scene: Scene, *, told: bool) -> ContactPo
     one named first, with its friction and the area of the surfaces of both.
     """
     kept, lost = _shared(points, scene)
-    if not told:
-        words = "the contact of %s leaves out %s, where force and friction are those of %s at the same places"
-        _tell(words, (scene.contacts, points, lost), (scene.contacts, points, kept))
+    words = "the contact of %s leaves out %s, where force and friction are those of %s at the same places"
+    advice.left_out(words, (scene.contacts, points, lost), (scene.contacts, points, kept), comm)
     area, taken = areas_taken(points, (kept, lost), scene)
     if points.taken is not None:
         taken = taken.maximum(points.taken)  # not their sum: entries are numbers of nodes
@@ -570,7 +568,7 @@ def areas_taken(
     """
     kept, lost = couples
     beside = np.zeros(len(kept), dtype=bool)
-    for one, other, which in _by_pairs(points.pair[kept], points.pair[lost]):
+    for one, other, which in by_pairs(points.pair[kept], points.pair[lost]):
         beside[which] = are_beside(scene, scene.contacts[one], scene.contacts[other])
     # A node that two points could stand for gives its area to one of them.
     _, first = np.unique(np.where(beside, lost, -1), return_index=True)
@@ -666,19 +664,7 @@ def _unit_rows(jump: sp.csr_matrix) -> sp.csr_matrix:
     return sp.diags(1.0 / np.maximum(size, np.finfo(float).tiny)) @ jump
 
 
-#: Pairs, their points, and numbers of some of them.
-_Side = tuple[Sequence[ContactPair | AnyTie], ContactPoints, np.ndarray]
-
-
-def _tell(words: str, lost: _Side, kept: _Side) -> None:
-    """Log how many points of which pair are left out for which other pair."""
-    (pairs, points, one), (others, those, other) = lost, kept
-    for here, there, which in _by_pairs(points.pair[one], those.pair[other]):
-        left_out = counted(len(np.unique(one[which])), "node")
-        safe_log(_LOG.info, words, pairs[here].place, left_out, others[there].place)
-
-
-def _by_pairs(left: np.ndarray, right: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
+def by_pairs(left: np.ndarray, right: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
     """Yield each combination of pairs that occurs, with its places in the lists."""
     for one, other in np.unique(np.column_stack([left, right]), axis=0):
         yield int(one), int(other), (left == one) & (right == other)

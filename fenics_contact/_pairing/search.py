@@ -24,6 +24,7 @@ import scipy.sparse as sp
 from fenics_contact._base.display import displayed
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
+from fenics_contact._pairing.advice import SILENCE, Advice
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.points import (
     ContactPoints,
@@ -34,13 +35,7 @@ from fenics_contact._pairing.points import (
     tangent_frames,
     with_symmetry,
 )
-from fenics_contact._pairing.projection import (
-    shared_projection,
-    warn_of_edge,
-    warn_of_free_master,
-    warn_of_surface,
-    warn_of_uneven_pressure,
-)
+from fenics_contact._pairing.projection import shared_projection
 from fenics_contact._pairing.tips import carrying
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
@@ -321,7 +316,7 @@ def find_contact_points(
     *,
     axes: LocalAxes | None = None,
     finer: bool = False,
-    told: bool = False,
+    advice: Advice = SILENCE,
 ) -> ContactPoints:
     """Find the contact points of every contact pair. Collective on ``comm``.
 
@@ -331,7 +326,7 @@ def find_contact_points(
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`; `comm`:
     communicator of the ranks that share the work; this rank alone by default.
     """
-    return _points_of_pairs(scene, scene.contacts, (fixed, axes), comm or MPI.COMM_SELF, finer, told)
+    return _points_of_pairs(scene, scene.contacts, (fixed, axes), comm or MPI.COMM_SELF, finer, advice)
 
 
 def find_tied_points(
@@ -340,10 +335,10 @@ def find_tied_points(
     comm: MPI.Comm | None = None,
     *,
     axes: LocalAxes | None = None,
-    told: bool = False,
+    advice: Advice = SILENCE,
 ) -> ContactPoints:
     """Find the points of tied surfaces, as `find_contact_points`; ``pair`` numbers the ties. Collective."""
-    return _points_of_pairs(scene, scene.ties, (fixed, axes), comm or MPI.COMM_SELF, told=told)
+    return _points_of_pairs(scene, scene.ties, (fixed, axes), comm or MPI.COMM_SELF, advice=advice)
 
 
 def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -394,19 +389,19 @@ def _points_of_pairs(
     supported: tuple[np.ndarray, LocalAxes | None],
     comm: MPI.Comm,
     finer: bool = False,
-    told: bool = False,
+    advice: Advice = SILENCE,
 ) -> ContactPoints:
     fixed, axes = supported
-    parts, told = [], told or finer
+    parts = []
     for index, pair in enumerate(pairs):
         if isinstance(pair, ContactPair) and pair.within_body:
             continue  # no part of an undeformed body is near another one
-        points = _measured(scene, pair, index, supported, comm, finer, told=told)
+        points = _measured(scene, pair, index, supported, comm, finer, advice)
         if isinstance(pair, ContactPair) and pair.given_gap:
             origin, mesh = scene.origin, scene.bodies[pair.slave.body].mesh.origin
             first = points
             if origin is not scene:
-                first = _measured(origin, pair, index, supported, comm, finer, told=True)
+                first = _measured(origin, pair, index, supported, comm, finer, SILENCE)
             slave = first.slave - NodeNumbers.of(scene).first_of(pair.slave.body)
             points = with_given_gaps(points, first, pair, mesh.points[slave], comm)
         if scene.has_thickness:
@@ -430,7 +425,7 @@ def _measured(
     supported: tuple[np.ndarray, LocalAxes | None],
     comm: MPI.Comm,
     finer: bool,
-    told: bool,
+    advice: Advice,
 ) -> ContactPoints:
     """Return the points of one pair with the gaps between its surfaces. Collective."""
     fixed, axes = supported
@@ -445,8 +440,7 @@ def _measured(
         axial = pair.axial_nodes(scene.bodies[pair.slave.body].mesh, pair.slave.name)
         movable &= ~np.isin(slave.nodes, numbers.global_nodes(pair.slave.body, axial))
     bearing = movable & may_touch(scene.bodies, pair, slave.surface)
-    if not told:
-        warn_of_surface(scene, pair.slave, pair.geometry, slave.surface, comm)
+    advice.surface(scene, pair.slave, pair.geometry, slave.surface, comm)
     master: _Side | RigidObstacle
     if isinstance(pair.master, Surface):
         master = _Side.of(scene, pair.master, pair.geometry, numbers, finer)
@@ -469,23 +463,21 @@ def _measured(
             master = master.turned(pair, scene.sector_angle(pair))
             with together(comm):
                 check_sides(pair, scene.sector_angle(pair), slave.surface, master.surface)
-        if not told:
-            assert isinstance(pair.master, Surface)
-            warn_of_surface(scene, pair.master, pair.geometry, master.surface, comm)
-        if isinstance(pair, Tie) and not pair.sliding and not told and axes is None:
+        assert isinstance(pair.master, Surface)
+        advice.surface(scene, pair.master, pair.geometry, master.surface, comm)
+        if isinstance(pair, Tie) and not pair.sliding and axes is None:
             one, other = ((side.surface, fixed[side.nodes]) for side in (slave, master))
-            warn_of_free_master(pair, one, other, comm)
+            advice.free_master(pair, one, other, comm)
         if pair.discretisation == "mortar":
             # Of linear facets only what supports hold: a hanging node, say, moves and keeps its function.
             free = ~fixed[slave.nodes].all(axis=1) if slave.surface.whole is None else None
             points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair), free)
         else:
             points = _by_projection(slave, bearing, master, comm)
-            if not told and may_touch(scene.bodies, pair, slave.surface).all():
-                warn_of_uneven_pressure(scene, pair, slave.surface, master.surface, comm)
+            advice.uneven_pressure(scene, pair, slave.surface, master.surface, comm)
             if not isinstance(pair, ContactPair):
                 held = ~movable | np.isin(slave.nodes, points.slave)
-                warn_of_edge(pair, slave.surface, held, master.surface, comm)
+                advice.edge_of_tie(pair, slave.surface, held, master.surface, comm)
         if isinstance(pair, CyclicSymmetry):
             turn = np.tile(pair.matrix(scene.sector_angle(pair)), (points.count, 1, 1))
             points = replace(points, turns=turn)

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import displayed
 from fenics_contact._fem.loads import as_tractions
+from fenics_contact._pairing.advice import ADVICE, SILENCE, Advice
 from fenics_contact._pairing.points import (
     ContactPoints,
     join_points,
@@ -45,18 +46,18 @@ if TYPE_CHECKING:
 
 
 def meeting_points(
-    scene: Scene, decomposition: Decomposition, *, overlap: bool, told: bool = False
+    scene: Scene, decomposition: Decomposition, *, overlap: bool, advice: Advice = SILENCE
 ) -> tuple[ContactPoints, ContactPoints]:
     """Search for contact and tied points, only where the scene has pairs. Collective."""
     tearing, fixed, comm = decomposition.tearing, decomposition.fixed, decomposition.comm
     axes = decomposition.axes
     points = ties = join_points([], scene.components, tearing.n_nodes)
     if scene.contacts:
-        points = find_contact_points(scene, fixed, comm, axes=axes, told=told)
+        points = find_contact_points(scene, fixed, comm, axes=axes, advice=advice)
         if not overlap:
             check_no_penetration(scene, points)
     if scene.ties:
-        ties = find_tied_points(scene, fixed, comm, axes=axes, told=told)
+        ties = find_tied_points(scene, fixed, comm, axes=axes, advice=advice)
         if len(scene.ties) > 1:
             ties = tied_once(ties, scene, fixed, axes)
         if scene.sectors:
@@ -67,9 +68,9 @@ def meeting_points(
             ties = joined_around(ties, ties, scene, areas=False)
             points = joined_around(points, ties, scene)
         if scene.contacts:
-            points = without_tied(points, ties, scene, fixed, axes, told=told or comm.rank > 0)
+            points = without_tied(points, ties, scene, fixed, axes, advice, comm)
     if len(scene.contacts) > 1:
-        points = shared_once(points, scene, told=told or comm.rank > 0)
+        points = shared_once(points, scene, advice, comm)
     return points, ties
 
 
@@ -77,7 +78,7 @@ def check_apart(scene: Scene, decomposition: Decomposition) -> None:
     """Search for contact and reject bodies that overlap at the start. Collective."""
     if scene.contacts:
         fixed, axes = decomposition.fixed, decomposition.axes
-        points = find_contact_points(scene, fixed, decomposition.comm, axes=axes, told=True)
+        points = find_contact_points(scene, fixed, decomposition.comm, axes=axes)
         check_no_penetration(scene, points)
 
 
@@ -515,8 +516,9 @@ def _found(
     prescribed: np.ndarray,
 ) -> RowGroups:
     """Search for contact, and return all groups of rows. Collective."""
-    told = previous is not None and previous.scene.has_surfaces_of(scene)
-    points, ties = meeting_points(scene, decomposition, overlap=overlap, told=told)
+    known = previous is not None and previous.scene.has_surfaces_of(scene)
+    advice = SILENCE if known else ADVICE
+    points, ties = meeting_points(scene, decomposition, overlap=overlap, advice=advice)
     found = _joints(scene, decomposition, ties, () if previous is None else previous.groups.joints)
     with together(decomposition.comm):
         left = ties

@@ -44,7 +44,7 @@ def with_given_offsets(
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `comm`: communicator of the
     ranks; all have the same pairs and points.
     """
-    first = find_contact_points(scene, fixed, comm, told=True)
+    first = find_contact_points(scene, fixed, comm)
     result = []
     for index, (meeting, pair) in enumerate(zip(meetings, scene.contacts, strict=True)):
         if not pair.given_gap:
