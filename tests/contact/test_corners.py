@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact import (
@@ -27,6 +28,7 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact._pairing.mortar.coupling import mortar_coupling
+from fenics_contact._pairing.mortar.normals import normals_at
 from fenics_contact._scene.choice import EXCHANGED
 from fenics_contact._scene.discretisation import keeping_discretisation
 from fenics_contact.gallery import block, rectangle
@@ -364,3 +366,13 @@ def test_an_edge_of_which_hardly_a_part_faces_the_master_keeps_its_normal() -> N
     assert leaning[0] < 1e-3
     assert 1.0 < leaning[1] < leaning[2]
     assert leaning[2] == pytest.approx(53.0, abs=2.0), "as the disc over the end of the line"
+
+
+def test_edges_on_planes_of_symmetry_have_normals_in_them() -> None:
+    """A wall along the plane has none there: its edge keeps its own, the next node has the wall's."""
+    line = lattice(np.array([[0.0, 0.0], [1.0, 0.0]]), "edges", False)
+    line = replace(line, sharp=np.full(2, 0.1), mirrored=np.array([[True, False], [False, False]]))
+    wall = lattice(np.array([[0.0, 0.0], [0.0, 1.0]]), "edges", False)
+    normal = normals_at(line, wall, np.arange(2), sp.identity(2, format="csr"), np.ones(2))
+    np.testing.assert_allclose(np.abs(wall.normals), [[1.0, 0.0]] * 2, atol=1e-12)
+    np.testing.assert_allclose(normal, [-line.normals[0], wall.normals[1]], atol=1e-12)
