@@ -1,11 +1,11 @@
-"""All groups of rows of a system, and their numbers."""
+"""All groups of rows of a system, their numbers and their compliance."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,6 +14,38 @@ from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.scene import Scene
 from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
 from fenics_contact.feti.row_groups import Glued, Joint, RowGroup, Unknowns
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.compliance import Compliance
+
+@dataclass(frozen=True, eq=False)
+class RowCompliance:
+    """C(λ) of this rank's rows.
+
+    Attributes:
+        soft: Positions of rows of equality with a compliance among the owned ones, shape (k,).
+        constant: That of each of these, C(λ) = C λ, shape (k,), [length / force].
+        contact: That of contact rows, see `qp`; None where none has any.
+    """
+
+    soft: np.ndarray
+    constant: np.ndarray
+    contact: Compliance | None
+
+    def added(self, product: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
+        """Add C λ in rows of equality to an owned vector, in place, and return it."""
+        product[self.soft] += self.constant * multiplier[self.soft]
+        return product
+
+    def energies(self, multiplier: np.ndarray) -> tuple[float, float]:
+        """Return λᵀC(λ) and Φ(λ), with Φ' = C, of this rank's rows, [force · length]."""
+        force = multiplier[self.soft]
+        work = float(force @ (self.constant * force))
+        if self.contact is None:
+            return work, 0.5 * work
+        pressing = float(multiplier @ self.contact.given_way(multiplier))
+        return work + pressing, 0.5 * work + self.contact.work(multiplier)
+
 
 Kind = TypeVar("Kind", bound=RowGroup)
 

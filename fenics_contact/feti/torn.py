@@ -27,9 +27,8 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.true_shapes import is_approximate
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import safe_log
-from fenics_contact.feti.all_rows import RowGroups
+from fenics_contact.feti.all_rows import RowCompliance, RowGroups
 from fenics_contact.feti.averages import nodal_mean_at
-from fenics_contact.feti.compliance import RowCompliance
 from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
 from fenics_contact.feti.decomposition import Decomposition, DualNumbering, prescribed_along, stack
 from fenics_contact.feti.free_motions import FreeMotions, free_motions
@@ -37,7 +36,7 @@ from fenics_contact.feti.initial_gaps import check_no_penetration
 from fenics_contact.feti.joints import JOINTS
 from fenics_contact.feti.row_groups import Glued, Joint, RowGroup
 from fenics_contact.feti.subdomain import Assembled, Subdomain, assemble
-from fenics_contact.feti.ties import TieRows
+from fenics_contact.feti.ties import BondedTies, SlidingTies, TieRows
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 
@@ -290,7 +289,7 @@ class TornSystem:
     @property
     def tie_rows(self) -> tuple[TieRows, ...]:
         """The rows of the scene's ties."""
-        return tuple(each for each in self.groups.joints if isinstance(each, TieRows))
+        return (*self.groups.of(BondedTies), *self.groups.of(SlidingTies))
 
     @property
     def ties(self) -> ContactPoints:
