@@ -238,6 +238,7 @@ class ContactProblem:
             ConvergenceError: If the solver does not reach its tolerance; the last solution stays unchanged.
 
         Example:
+            >>> from dataclasses import replace
             >>> coarse = solve_scene(scene, comm)  # doctest: +SKIP
             >>> finer = refined(scene.bodies["block"].mesh, [0, 1])  # doctest: +SKIP
             >>> fine_body = replace(scene.bodies["block"], mesh=finer.mesh)  # doctest: +SKIP

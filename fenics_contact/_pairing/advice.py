@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
-from typing import TypeAlias
 
 import numpy as np
 
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
-from fenics_contact._pairing.points import HELD, ContactPoints, by_pairs
+from fenics_contact._pairing.points import HELD, SomePoints, by_pairs
 from fenics_contact._pairing.projection import shared_projection
 from fenics_contact._pairing.uneven_pressure import unevenness
 from fenics_contact._scene.pair_geometry import master_share
@@ -191,7 +189,3 @@ class _Silence(Advice):
 
 
 ADVICE, SILENCE = Advice(), _Silence()
-
-
-#: Pairs, their points, and numbers of some of them.
-SomePoints: TypeAlias = tuple[Sequence[ContactPair | AnyTie], ContactPoints, np.ndarray]

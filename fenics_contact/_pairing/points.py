@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,7 +23,6 @@ from fenics_contact.mesh.faces import corners_of, match_faces
 from fenics_contact.qp.cones import Strengths
 
 if TYPE_CHECKING:
-    from fenics_contact._pairing.advice import Advice
     from fenics_contact.qp.compliance import Closures
 
 Law = TypeVar("Law")
@@ -493,13 +492,24 @@ PARALLEL = 0.9
 _LOG = logging.getLogger(__name__)
 
 
+#: Pairs, their points, and numbers of some of them.
+SomePoints: TypeAlias = tuple[Sequence[ContactPair | AnyTie], ContactPoints, np.ndarray]
+
+
+class Notices(Protocol):
+    """Who is told which points are left out, see `_pairing.advice`."""
+
+    def left_out(self, words: str, lost: SomePoints, kept: SomePoints, comm: MPI.Comm) -> None:
+        """Take notice of points that are left out for others."""
+
+
 def without_tied(
     points: ContactPoints,
     ties: ContactPoints,
     scene: Scene,
     fixed: np.ndarray,
     axes: LocalAxes | None,
-    advice: Advice,
+    advice: Notices,
     comm: MPI.Comm,
 ) -> ContactPoints:
     """Return the contact points that no tie has as well.
@@ -542,7 +552,7 @@ def tied_once(
     return ties.part(np.setdiff1d(np.arange(ties.count), lost))
 
 
-def shared_once(points: ContactPoints, scene: Scene, advice: Advice, comm: MPI.Comm) -> ContactPoints:
+def shared_once(points: ContactPoints, scene: Scene, advice: Notices, comm: MPI.Comm) -> ContactPoints:
     """Return the contact points, of those that compare the same places in one direction only one.
 
     Where an edge belongs to two contact pairs, or two pairs have the same surfaces, their normal forces would

@@ -19,7 +19,6 @@ from scipy.sparse.linalg import SuperLU
 
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import HELD, PARALLEL, ContactPoints
-from fenics_contact._pairing.sectors import without_repeated
 from fenics_contact._scene.scene import Scene
 from fenics_contact.feti.constraints import ConstraintRows, factored
 
@@ -49,6 +48,8 @@ def once_at_periodic_edges(
 
     `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, components), [length].
     """
+    from fenics_contact._pairing.sectors import without_repeated
+
     one, other = _candidates(points, constraints, len(scene.contacts if areas else scene.ties))
     if len(one) == 0 or constraints.count == 0:
         return points

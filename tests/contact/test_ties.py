@@ -30,6 +30,7 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact._equilibrium.warnings import _Gradients, rotation_of
+from fenics_contact._pairing.advice import ADVICE
 from fenics_contact._pairing.search import find_tied_points
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import Discretisation
@@ -146,7 +147,7 @@ def test_a_master_that_only_a_held_slave_holds_is_told(slave: int, caplog: pytes
     held = [Support("upper", "z0", (None, None, 0.0)), Support("lower", "z0", (0.0, 0.0, None))]
     scene = tower(supports=held, ties=[Tie(*sides)])
     fixed = np.concatenate([~np.isnan(scene.prescribed(name)) for name in scene.bodies])
-    assert find_tied_points(scene, fixed).count > 0
+    assert find_tied_points(scene, fixed, advice=ADVICE).count > 0
     warned = ["the master is free there" in record.message for record in caplog.records]
     assert any(warned) == (slave == 0)
 
@@ -186,7 +187,8 @@ def test_ties_by_nodes_beyond_the_masters_edge_are_told(
 
     def told(tie: Tie) -> list[str]:
         caplog.clear()
-        find_tied_points(Scene(bodies, ties=[tie]), np.zeros((wide.n_nodes + narrow.n_nodes, 3), dtype=bool))
+        free = np.zeros((wide.n_nodes + narrow.n_nodes, 3), dtype=bool)
+        find_tied_points(Scene(bodies, ties=[tie]), free, advice=ADVICE)
         return [record.getMessage() for record in caplog.records]
 
     words = told(Tie(over, under, discretisation="node"))
