@@ -127,6 +127,24 @@ def rods(constraint: LinearConstraint, material=ROW, loads=()) -> Scene:
     return Scene(bodies, held, loads, constraints=[constraint])
 
 
+def test_equations_hold_on_when_supports_change() -> None:
+    """Several equations, of which each has a row, and a support that a later load step takes away."""
+    ends = [ConstraintTerm("a", "x1", "x"), ConstraintTerm("b", "x1", "x", -1.0)]
+    pull = [Traction("a", "x1", (2.0, 0.0, 0.0))]
+    scene = rods(LinearConstraint(ends, 0.01, "ends", "translation"), loads=pull)
+    aside = [*scene.supports, Support("b", "x1", (None, 0.1, None))]
+    steps = [LoadStep("aside", pull, supports=aside), LoadStep("released", pull, supports=scene.supports)]
+    states = solve_steps(ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-11), steps)
+    alone = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-11)
+    assert np.abs(states[0].gather_displacement("b")[:, 1]).max() == pytest.approx(0.1)
+    for name in scene.bodies:
+        found, wanted = (state.gather_displacement(name) for state in (states[1], alone))
+        np.testing.assert_allclose(found, wanted, atol=1e-8 * np.abs(wanted).max())
+    force = alone.constraints()["ends"].force
+    assert len(force) == 4
+    np.testing.assert_allclose(states[1].constraints()["ends"].force, force, rtol=1e-6)
+
+
 def gear() -> list[ConstraintTerm]:
     """The end of a moves twice as far as that of b."""
     a = ConstraintTerm("a", "x1", "x", 0.25, equation=0)
