@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ from fenics_contact.decks.loads import LoadBuilder
 from fenics_contact.decks.names import names_of
 from fenics_contact.decks.pairs import Pairs, pairs_of
 from fenics_contact.decks.supports import SupportBuilder
-from fenics_contact.decks.tables import Print, PrintTable, tables_of
+from fenics_contact.decks.tables import Print, PrintTable
 from fenics_contact.decks.unknown import refuse_unknown
 from fenics_contact.decks.vocabulary import PROCEDURES
 from fenics_contact.errors import InvalidInputError
@@ -34,6 +34,10 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from fenics_contact.results.state import State
+
+
+#: Components of stresses in the order of the deck's tables.
+_COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 @displayed
@@ -124,13 +128,63 @@ class Deck:
         """Return the tables that the deck prints of a step. Collective.
 
         Displacements (U) of nodes, forces of supports on them (RF), and mean stresses (S) of elements; with
-        TOTALS a last row, of number 0, has the sums.
+        TOTALS a last row, of number 0, has the sums. Other variables are in the files for ParaView.
 
         Args:
             state: The state at the end of the step.
             step: Number of the deck's step, from 0.
         """
-        return tables_of(self, state, step)
+        asked = [each for each in self.prints if each.step == step]
+        return [self._in_instances(table) for each in asked for table in self._tables(each, state)]
+
+    def _in_instances(self, table: PrintTable) -> PrintTable:
+        """Return a table with the numbers that nodes and elements have in their instances."""
+        if self.instances is None:
+            return table
+        names, own = self.instances.own(table.rows[:, 0])
+        return replace(table, rows=np.column_stack([own, table.rows[:, 1:]]), instances=tuple(names))
+
+    def _tables(self, asked: Print, state: State) -> Iterator[PrintTable]:
+        for variable in asked.variables:
+            name = f"{asked.card} {variable} {asked.where}".strip()
+            if asked.card == "NODE PRINT" and variable in ("U", "RF"):
+                rows = self._of_nodes(asked.where, state, variable)
+                if asked.totals:
+                    sums = [0.0, *rows[:, 1:].sum(axis=0)]
+                    rows = np.vstack([rows[:0] if asked.totals == "ONLY" else rows, sums])
+                short = {"U": "u", "RF": "f"}[variable]
+                names = [f"{short}{axis}" for axis in "xyz"[: rows.shape[1] - 1]]
+                yield PrintTable(name, ("node", *names), rows)
+            elif asked.card == "EL PRINT" and variable == "S":
+                names = [f"S{'xyz'[a]}{'xyz'[b]}" for a, b in _COMPONENTS]
+                yield PrintTable(name, ("element", *names), self._of_elements(asked.where, state))
+
+    def _of_nodes(self, where: str, state: State, variable: str) -> np.ndarray:
+        """Return displacements or reactions of nodes behind their numbers."""
+        found = list[np.ndarray]()
+        for body, nodes in self.node_numbers.items():
+            mine = np.flatnonzero((nodes > 0) & np.isin(nodes, self.node_sets[where] if where else nodes))
+            if variable == "U":
+                values = state.gather_displacement(body)[mine]
+            else:
+                values = state.nodal_reactions(body)[mine] * self.thickness
+            found.append(np.column_stack([nodes[mine], values]))
+        rows = np.vstack(found)
+        nodes, first, number = np.unique(rows[:, 0], return_index=True, return_inverse=True)
+        if variable == "U" or len(nodes) == len(rows):
+            return rows[first]
+        sums = [np.bincount(number.ravel(), column) for column in rows[:, 1:].T]  # of bodies that share nodes
+        return np.column_stack([nodes, *sums])
+
+    def _of_elements(self, where: str, state: State) -> np.ndarray:
+        """Return the mean stresses of elements behind their numbers."""
+        found = []
+        for body, elements in self.element_numbers.items():
+            mine = np.flatnonzero(np.isin(elements, self.element_sets[where] if where else elements))
+            stress = state.gather_stress(body)[mine]
+            found.append(np.column_stack([elements[mine], *(stress[:, a, b] for a, b in _COMPONENTS)]))
+        rows = np.vstack(found)
+        return rows[np.argsort(rows[:, 0], kind="stable")]
 
 
 @naming_arguments
