@@ -73,16 +73,15 @@ def by_node(driven: Sequence[Driven], mesh: DeckMesh) -> list[list[Driven]]:
         others = found.setdefault(each.node, [])
         if others and (each.spread or others[0].spread):
             raise each.card.error(
-                f"node {mesh.numbers[each.node]} is the reference node of {others[0].name!r}, too, and a "
-                "distributing coupling shares its force: give each surface a node of its own, or one surface "
-                "of all faces"
+                f"node {mesh.numbers[each.node]} of a distributing coupling is also that of "
+                f"{others[0].name!r}: give it a node of its own"
             )
         first = turned.setdefault(each.turning, each) if each.turning >= 0 else each
         for other in (*others[:1], first):
             if (other.node, other.turning) != (each.node, each.turning):
                 raise each.card.error(
-                    f"{each.name!r} shares one of its nodes with {other.name!r}, but not both: surfaces that "
-                    "move as one piece need the same REF NODE and the same ROT NODE, others their own"
+                    f"{each.name!r} must share both REF NODE and ROT NODE with {other.name!r}, or neither: "
+                    "correct them"
                 )
         others.append(each)
     return list(found.values())
@@ -94,8 +93,7 @@ def require_own_nodes(users: Sequence[tuple[Card, int]], mesh: DeckMesh) -> None
     for card, node in users:
         if node in seen:
             raise card.error(
-                f"node {mesh.numbers[node]} is that of a card before, too, and its force would act twice: "
-                "give each a node of its own"
+                f"node {mesh.numbers[node]} is used by a card before: give each a node of its own"
             )
         seen.add(node)
 
@@ -217,9 +215,8 @@ class LocalAxes:
                 wrong |= np.nan_to_num(held).any(axis=1) | force.any(axis=1)
                 if wrong.any():
                     raise card.error(
-                        f"node {self.mesh.numbers[nodes[wrong][0]]} is on the axis of the cylinder, where no "
-                        "direction is the radial one, but it is held or loaded along component 1 or 2: hold "
-                        "both at zero there, or leave it out of the set"
+                        f"node {self.mesh.numbers[nodes[wrong][0]]} is on the axis of the cylinder: hold "
+                        "components 1 and 2 both at zero"
                     )
 
 

@@ -44,8 +44,7 @@ def read_initial(
             _at_points(card, mesh, stress, note)
         elif 8 in widths:
             raise card.error(
-                "lines must all have an element, an integration point and six stresses, or all an element or "
-                "set and its stresses, got both: make two cards of them"
+                "lines must all have integration points, or none, got both: make two cards of them"
             )
         else:
             for row, entries in enumerate(card.rows):
@@ -67,8 +66,8 @@ def relieved(strain: np.ndarray, material: Material, card: Card) -> np.ndarray:
     """Return the stresses −C : ε of bodies that are held, of plastic strains, both (n, 6)."""
     if not isinstance(material, IsotropicElasticity | PlaneStrain):
         raise card.error(
-            "plastic strains are read for isotropic elastic solids or those in plane strain without NLGEOM, "
-            f"here is {type(material).__name__}: leave them out"
+            f"plastic strains need isotropic elasticity without NLGEOM, got {type(material).__name__}: "
+            "leave them out"
         )
     first, shear = lame(material.young_modulus, material.poisson_ratio)
     stress = -2 * shear * strain

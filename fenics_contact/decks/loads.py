@@ -74,8 +74,8 @@ class LoadBuilder:
                 continue
             if any(map(is_nonlinear, body.materials)):
                 raise deck.stress.card.error(
-                    f"initial stresses are read for linear materials without NLGEOM, body {part.name} has "
-                    f"{body.in_words}: leave them out"
+                    f"initial stresses need linear materials without NLGEOM, got {body.in_words}: leave "
+                    "them out"
                 )
             value: Any = tuple(stress[0].tolist())
             if np.ptp(stress, axis=0).any():
@@ -87,12 +87,12 @@ class LoadBuilder:
         body, *others = self.built.bodies_with(name)
         if others:
             raise driven.card.error(
-                f"a distributing coupling loads a surface of one body, {driven.name!r} is on {body} and "
-                f"{', '.join(others)}: give one for each, with a node of its own"
+                f"a distributing coupling must load one body, {driven.name!r} is also on "
+                f"{', '.join(others)}: give one for each"
             )
         if not np.isnan(driven.row(instant.held)).all():
             raise driven.card.error(
-                "a distributing coupling takes forces, but its node is held: use *KINEMATIC for displacements"
+                "the node of a distributing coupling is held: use *KINEMATIC for displacements"
             )
         dim, load = self.built.deck.dim, driven.row(instant.forces).tolist()
         at = self.built.deck.mesh.points[driven.node, :dim]

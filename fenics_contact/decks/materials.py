@@ -61,10 +61,7 @@ def _axes(card: Card | None) -> tuple[tuple[float, float, float], ...]:
     if card is None:
         return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     if card.name_of("SYSTEM") not in ("", "RECTANGULAR", "R"):
-        raise card.error(
-            f"SYSTEM={card.name_of('SYSTEM')} is not read for materials that are not isotropic, whose "
-            "axes are the same everywhere: give rectangular axes, or sections of few elements"
-        )
+        raise card.error(f"SYSTEM={card.name_of('SYSTEM')} is not supported: give rectangular axes")
     if card.name_of("DEFINITION") not in ("", "COORDINATES"):
         raise card.error("DEFINITION must be COORDINATES: give axes by the coordinates of two points")
     numbers = card.floats(0)
@@ -168,9 +165,8 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
 def _row(card: Card, width: int, of: Conditions, what: str) -> list[float]:
     if of.temperature is None and depends_on_temperature(card, width):
         raise card.error(
-            "constants that depend on the temperature are read for isotropic elasticity in small strains, "
-            "but not in plane stress, or for one temperature of all nodes and steps, this deck has several: "
-            "give those for the mean temperature"
+            "constants of this material must not depend on the temperature: give those for the mean "
+            "temperature"
         )
     return row_at(card, width, of.temperature or 0.0, what)
 
@@ -186,10 +182,7 @@ def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> list[fl
             f"TYPE={kind} is not read for this material: give ISO, ORTHO or ANISO as *ELASTIC has"
         )
     if of.temperature is None and depends_on_temperature(card, width):
-        raise card.error(
-            "an expansion that depends on the temperature is read for isotropic elasticity in small strains, "
-            "but not in plane stress: give the mean one of the temperatures of the deck"
-        )
+        raise card.error("the expansion of this material must not depend on the temperature: give its mean")
     values = row_at(card, width, of.temperature or 0.0, "an expansion")
     if count == 6:
         along = values[:3] if width > 1 else values * 3
@@ -329,9 +322,8 @@ def _compliance(card: Card, moduli: np.ndarray, least: float = 1e-12) -> np.ndar
     size = np.linalg.eigvalsh(moduli)
     if not size[0] > least * size[-1]:
         raise card.error(
-            "stiffnesses must be such that every stretch stores energy, but the matrix of D1111 to D3333 has "
-            f"the eigenvalue {size[0]:.3g} beside {size[-1]:.3g}: give directions without stiffness a small "
-            "one, such as a thousandth of the largest"
+            f"stiffnesses must be positive definite, got the smallest eigenvalue {size[0]:.3g}: increase "
+            "small ones"
         )
     return np.asarray(np.linalg.inv(moduli))
 

@@ -84,9 +84,10 @@ def read_points(cards: Sequence[Card], mesh: DeckMesh, large: bool) -> list[Equa
                 )  # fmt: skip
             if large and kind not in ("PIN", "TIE"):
                 raise card.error(
-                    f"{kind} is not linear in displacements with NLGEOM: leave that out where displacements "
-                    "are small, or drive a rigid surface by *RIGID BODY", row,
-                )  # fmt: skip
+                    f"{kind} is not supported with NLGEOM: leave that out, or drive a rigid surface by "
+                    "*RIGID BODY",
+                    row,
+                )
             nodes = np.concatenate([mesh.nodes_named(token, card, row) for token in entries[1:]])
             least, rows_of = _KINDS[kind]
             if len(nodes) < least:

@@ -213,8 +213,7 @@ class _Naming:
             for each in several:
                 if self.deck.axes.turned(np.array([each.node, each.turning])).any():
                     raise each.card.error(
-                        "the node of a rigid surface must move along x, y and z, it has axes of its own by "
-                        "*TRANSFORM: leave it out of that set"
+                        "the node of a rigid surface must not have a *TRANSFORM: leave it out of that set"
                     )
             parts = [self._part(each) for each in several]
             name = " AND ".join(dict.fromkeys(name for name, _, _ in parts))
@@ -249,8 +248,8 @@ class _Naming:
             faces = self._whole(driven)
         if not len(faces) or not exterior.holds(faces).all():
             raise driven.card.error(
-                f"{driven.name!r} must be faces on the boundary of a body, or all nodes of some "
-                "faces, so that they move as one piece: give such a set"
+                f"{driven.name!r} must be faces on the boundary of a body, or all nodes of some: give such "
+                "a set"
             )
         return name, faces, none
 
@@ -288,9 +287,9 @@ class _Naming:
                 if other != name:
                     number = self.mesh.element_numbers[key[0]]
                     raise first.card.error(
-                        f"the same face of element {number} is loaded by {other!r} and {name!r}: load it "
-                        "once", first.row,
-                    )  # fmt: skip
+                        f"a face of element {number} is loaded by {other!r} and {name!r}: load it once",
+                        first.row,
+                    )
             self.surfaces[name] = faces
             self.deck.record.origins["load", name] = first.card.origin
             found.update((each.where, name) for each in several)
@@ -353,8 +352,8 @@ class _Naming:
                 turned = np.flatnonzero(instant.forces[:, 3:].any(axis=1) & ~deck.references)
                 if len(turned):
                     raise step.card.error(
-                        f"nodes of solid elements take no moments, node {self.mesh.numbers[turned[0]]} has "
-                        "one: load a surface by a node, with *COUPLING"
+                        f"node {self.mesh.numbers[turned[0]]} of a solid takes no moment: load a surface by "
+                        "*COUPLING"
                     )
                 _check_plane_forces(deck, step.card, instant.forces)
                 loose = deck.inside & ~deck.references
@@ -381,9 +380,10 @@ def _check_target(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.nda
     here = [node for node in target.nodes.tolist() if node in driving]
     if any(at.kept[node, list(target.components)].any() for at in steps.instants for node in here):
         raise target.card.error(
-            f"node {deck.mesh.numbers[here[0]]}, which drives a surface, was free before it is "
-            "FIXED: give the displacement at which it is to be held", target.row,
-        )  # fmt: skip
+            f"node {deck.mesh.numbers[here[0]]} drives a surface and was free before FIXED: give its "
+            "displacement",
+            target.row,
+        )
 
 
 def _check_turns(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.ndarray) -> None:
@@ -393,9 +393,8 @@ def _check_turns(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.ndar
     if turned and any(np.nan_to_num(at.held[free][:, turned]).any() for at in steps.instants):
         name = target.label or deck.mesh.numbers[free[0]]
         raise target.card.error(
-            f"nodes of solid elements have no rotation, but {name} is turned: drive the "
-            "surface by a node, with *RIGID BODY or *COUPLING", target.row,
-        )  # fmt: skip
+            f"{name} has no rotation that can be prescribed: use *RIGID BODY or *COUPLING", target.row
+        )
 
 
 def _check_plane(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.ndarray) -> None:
@@ -413,10 +412,10 @@ def _check_plane(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.ndar
         k = inner[int(abs(across[wrong][0] - np.equal(inner, 2)).argmax())]
         axis = ", ".join(f"{value:.4g}" for value in deck.axes.of(node)[k] + 0.0)
         raise target.card.error(
-            f"node {deck.mesh.numbers[node]} of plane elements is held along its axis {k + 1}, by "
-            f"*TRANSFORM ({axis}), which must be in the plane, and axis 3 along z: give other axes, or "
-            "hold components 1 to 3 at zero", target.row,
-        )  # fmt: skip
+            f"axis {k + 1} of node {deck.mesh.numbers[node]}, ({axis}), must be in the plane or along z: "
+            "correct *TRANSFORM",
+            target.row,
+        )
 
 
 def _check_equation(deck: DeckCards, steps: DeckSteps, equation: Equation) -> None:
@@ -434,18 +433,18 @@ def _check_equation(deck: DeckCards, steps: DeckSteps, equation: Equation) -> No
     if across.any():
         node, k = at[across][0], components[across][0]
         raise equation.card.error(
-            f"component {k + 1} of node {deck.mesh.numbers[node]} of plane elements is along "
-            "an axis of *TRANSFORM out of the plane: give axes 1 and 2 in it", equation.row,
-        )  # fmt: skip
+            f"axis {k + 1} of node {deck.mesh.numbers[node]} is out of the plane: correct *TRANSFORM",
+            equation.row,
+        )
     if not inside.any():
         raise equation.card.error("needs a node of an element, this equation has none: add one", equation.row)
     for node, component in zip(at[~inside], components[~inside], strict=True):
         if any(np.isnan(instant.held[node, component]) for instant in steps.instants):
             raise equation.card.error(
-                f"node {deck.mesh.numbers[node]} belongs to no element, its component {component + 1} in an "
-                "equation must have a value in all steps: give it by *BOUNDARY, or write the equation "
-                "without it", equation.row,
-            )  # fmt: skip
+                f"node {deck.mesh.numbers[node]} belongs to no element: give component {component + 1} by "
+                "*BOUNDARY in all steps",
+                equation.row,
+            )
 
 
 def _check_plane_forces(deck: DeckCards, card: Card, forces: np.ndarray) -> None:
@@ -455,7 +454,6 @@ def _check_plane_forces(deck: DeckCards, card: Card, forces: np.ndarray) -> None
     wrong |= deck.references & forces[:, 3:5].any(axis=1)
     if deck.dim == 2 and wrong.any():
         raise card.error(
-            "plane elements take forces along x and y and moments about z, node "
-            f"{deck.mesh.numbers[np.flatnonzero(wrong)[0]]} has others by *CLOAD: correct their "
-            "components, or the axes of *TRANSFORM"
+            f"node {deck.mesh.numbers[np.flatnonzero(wrong)[0]]} has a *CLOAD out of the plane: correct its "
+            "components"
         )

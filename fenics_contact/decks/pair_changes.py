@@ -77,10 +77,7 @@ def _changed(
     else:
         new = replace(old, behavior=card)
         if old.tied or new.tied:
-            raise card.error(
-                "surfaces that stay together are a tie, which acts in all steps: give the interaction "
-                "another behaviour than TIED, or make two decks"
-            )
+            raise card.error("a step cannot change TIED: give another behaviour, or make two decks")
     return {**interactions, name: new}
 
 
@@ -89,8 +86,7 @@ def _switched(card: Card, now: PairChange) -> frozenset[tuple[str, str]]:
     of_pairs = card.name_of("TYPE").replace(" ", "") == "CONTACTPAIR"
     if not of_pairs or ("REMOVE" in card.parameters) == ("ADD" in card.parameters):
         raise card.error(
-            "contact pairs are switched off and on, with TYPE=CONTACT PAIR and REMOVE or ADD, got "
-            f"{card.given}: elements stay, leave them out of the deck"
+            f"needs TYPE=CONTACT PAIR and REMOVE or ADD, got {card.given}: elements cannot be changed"
         )
     pairs = set()
     for row, entries in enumerate(card.rows):

@@ -117,8 +117,9 @@ def _adjusted(built: DeckBodies) -> _Clearances:
         left = np.setdiff1d(own, chosen)
         if len(left):
             raise of.card.error(
-                f"ADJUST={name} must be a distance, or a set with all nodes of the slave, but {len(left)} of "
-                f"{len(own)} are not in it, such as {mesh.numbers[left[0]]}: add them"
+                f"ADJUST={name} must have all nodes of the slave, {len(left)} of {len(own)} are missing, "
+                "such "
+                f"as {mesh.numbers[left[0]]}: add them, or give a distance"
             )
         found[of.slave, of.master] = of.card, 0.0
     return found

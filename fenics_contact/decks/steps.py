@@ -459,8 +459,7 @@ def _check_step(head: Card, group: Sequence[Card]) -> None:
     """Reject steps that are not static, perturbations, and other amplitudes of all loads than two."""
     if "PERTURBATION" in head.parameters:
         raise head.error(
-            "PERTURBATION is not read: a step here has all loads, give them in full, or take the steps of "
-            "statics before it alone (statics_only=True, or --statics-only)"
+            "PERTURBATION is not supported: give all loads, or read the steps before alone (statics_only)"
         )
     amplitude = head.name_of("AMPLITUDE") or "RAMP"
     if amplitude not in ("RAMP", "STEP"):
@@ -468,8 +467,7 @@ def _check_step(head: Card, group: Sequence[Card]) -> None:
     for card in group:
         if card.name in PROCEDURES:
             raise card.error(
-                "only *STATIC is solved here: take the steps of statics alone (statics_only=True, or "
-                "--statics-only), or leave this one out"
+                "only *STATIC is solved: leave this step out, or read the steps before alone (statics_only)"
             )
     if not any(card.name == "STATIC" for card in group):
         raise head.error("needs *STATIC: nothing else is solved here, add it")

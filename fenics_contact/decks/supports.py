@@ -79,9 +79,8 @@ class SupportBuilder:
         if not kept.all():
             target = next(each for each in self.built.steps.targets if each.fixed)
             raise target.card.error(
-                f"nodes of {name!r} that are FIXED were partly free before: give those that were in a set of "
-                "their own", target.row,
-            )  # fmt: skip
+                f"nodes of {name!r} that are FIXED were partly free before: make two sets of them", target.row
+            )
         return Kept()
 
     def _always_zero(self, nodes: np.ndarray, held: Sequence[int]) -> bool:
@@ -175,8 +174,8 @@ class SupportBuilder:
         moved = None if steps.large else by_small_turns(points, leaders)
         if moved is None:
             raise driven.card.error(
-                f"{name!r} is on several bodies, and its nodes on one of them do not say how it turns: hold "
-                "the rotations of its node at zero, take NLGEOM away, or join the bodies"
+                f"nodes of {name!r} on one body do not show how it turns: hold the rotations of its node at "
+                "zero"
             )
         return moved
 

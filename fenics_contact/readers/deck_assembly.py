@@ -65,7 +65,7 @@ class _Instance:
             axis = np.array(given[3:6]) - given[:3] if len(given) == 7 else np.zeros(3)
             if not axis.any():
                 raise card.error(
-                    "a rotation needs two points of its axis and an angle in degrees, seven numbers, got "
+                    "a rotation needs two points and an angle, seven numbers, got "
                     f"{card.lines[1].strip()!r}: complete them",
                     1,
                 )
@@ -86,8 +86,8 @@ class _Instance:
             fits &= not self.shift[0] and bool(np.allclose(self.turn, np.eye(3), rtol=0.0, atol=1e-12))
         if not fits:
             raise self.card.error(
-                f"plane elements must stay in the plane of x and y, those of revolution on their axis, but "
-                f"part {self.part!r} has {element.name_of('TYPE')}: move it within the plane"
+                f"{element.name_of('TYPE')} of part {self.part!r} must stay in its plane, or on its axis: "
+                "move it within"
             )
 
 
@@ -221,10 +221,7 @@ def _opened(deck: _Deck, card: Card) -> list[Card]:
 def _of_instance(card: Card, instance: _Instance, instances: Instances) -> Card:
     """Return a card of a part as that of an instance."""
     if card.name not in _IN_PARTS:
-        raise card.error(
-            "this card is not read within a part, where nodes, elements, sets, surfaces, solid sections and "
-            "orientations are: give it in the assembly or behind it"
-        )
+        raise card.error("this card is not supported within a part: give it in the assembly or behind it")
     parameters, offset = dict(card.parameters), instances.offset(instance.name)
     for name in _NAMES[card.name]:
         if plain(parameters.get(name, "")):

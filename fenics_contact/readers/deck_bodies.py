@@ -55,7 +55,7 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
         block = mesh.blocks[mesh.block_of[lost[0]]]
         raise block.card.error(
             f"element {block.card.label(mesh.element_numbers[lost[0]])} and {len(lost) - 1} others have no "
-            "*SOLID SECTION: give every element one, which names its material"
+            "*SOLID SECTION: add it"
         )
     return sections, of_element
 
@@ -246,8 +246,8 @@ def build_bodies(
     if len(dims) > 1:
         block = next(b for b in mesh.blocks if b.element.kind != mesh.blocks[0].element.kind)
         raise block.card.error(
-            f"all elements must be of one kind, got {mesh.blocks[0].element.name} and {block.element.name}: "
-            "make two decks of them"
+            f"elements must be of one kind, got {mesh.blocks[0].element.name} and {block.element.name}: "
+            "make two decks"
         )
     dim = mesh.blocks[0].element.dim
     points = np.ascontiguousarray(mesh.points[:, :dim])
@@ -354,8 +354,7 @@ def integration_of(
     if len(found) > 1:
         block = next(each for each in blocks if each.element.variant == "R")
         raise block.card.error(
-            f"elements of a body must all have reduced integration or none, body {part.name} has both: "
-            "take one type of elements"
+            f"body {part.name} has elements of full and of reduced integration: take one type of elements"
         )
     return "reduced" if found.pop() else "full"
 

@@ -184,9 +184,9 @@ class Card:
         wrong = np.flatnonzero((values != np.round(values)) | (np.abs(values) > MOST_NUMBERS))
         if len(wrong):
             raise self.error(
-                f"numbers of nodes, elements and components must be whole and at most {MOST_NUMBERS}, got "
-                f"{values[wrong[0]]:g}: correct it", int(wrong[0]) if row is None else row,
-            )  # fmt: skip
+                f"numbers must be whole and at most {MOST_NUMBERS}, got {values[wrong[0]]:g}: correct it",
+                int(wrong[0]) if row is None else row,
+            )
         return values.astype(np.int64)
 
     @cached_property
@@ -250,9 +250,7 @@ class Card:
             start = records[lost[0]] - width if lost.size else ends[-1] // width * width
             row = int(np.searchsorted(ends, start, side="right"))
             raise self.error(
-                f"needs {width} numbers for each element, its number and its nodes, which this line and "
-                "those that continue it do not have: see whether TYPE= is right",
-                row,
+                f"needs {width} numbers for each element, this line has others: correct it, or TYPE=", row
             )
         return values.reshape(-1, width)
 
@@ -330,8 +328,7 @@ def _stretches(path: Path, folder: Path, inside: tuple[Path, ...]) -> Iterator[_
     heads = [k for k, line in enumerate(lines) if line[:1] == "*" and line[:2] != "**"]
     if not heads and not inside:
         raise DeckError(
-            "a deck must have cards that begin with an asterisk, such as *NODE, it has none: is it an input "
-            "file of CalculiX or Abaqus?",
+            "a deck must have cards such as *NODE, this file has none: give one of CalculiX or Abaqus",
             path.name,
         )
     yield _stretch("", lines, -1, 0, heads[0] if heads else len(lines), path.name)
@@ -355,9 +352,10 @@ def _without_keyword(stretch: _Stretch) -> _Stretch:
     """Take an asterisk alone for a comment, which data cannot follow."""
     if stretch.lines:
         raise DeckError(
-            "data cannot follow an asterisk alone, which is no card: name one, or write ** for a comment",
-            stretch.file, stretch.numbers[0],
-        )  # fmt: skip
+            "data cannot follow an asterisk alone: name a card, or write ** for a comment",
+            stretch.file,
+            stretch.numbers[0],
+        )
     return replace(stretch, keyword="")
 
 

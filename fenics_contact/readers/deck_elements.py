@@ -206,8 +206,8 @@ def without_repeated(
                 else ("they must be a prism, a pyramid or a tetrahedron")
             )
             raise card.error(
-                f"{len(mine)} elements of type {element.name} list nodes twice otherwise than "
-                f"linear ones may, first element {card.label(numbers[mine[0]])}: {remedy}"
+                f"{len(mine)} elements {element.name} list nodes twice, first "
+                f"{card.label(numbers[mine[0]])}: {remedy}"
             )
         shape, places, onto = found
         cell = {"prism": "wedge"}.get(shape.name, shape.name)

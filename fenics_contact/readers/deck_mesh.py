@@ -174,16 +174,14 @@ class DeckMesh:
             element = self.blocks[number].element
             if not 0 <= side < len(element.faces):
                 raise card.error(
-                    f"face {label!r} is not one of element type {element.name}, whose faces are "
-                    f"{label[:1]}1 to {label[:1]}{len(element.faces)}: correct the label",
+                    f"{element.name} has faces {label[:1]}1 to {label[:1]}{len(element.faces)}, got "
+                    f"{label!r}: correct the label",
                     row,
                 )
             if not element.faces[side]:
                 first = card.label(self.element_numbers[elements[block_of[elements] == number][0]])
                 raise card.error(
-                    f"face {label!r} of element {first}, which lists nodes twice, is no more than an edge: "
-                    "leave it out",
-                    row,
+                    f"face {label!r} of element {first} is no more than an edge: leave it out", row
                 )
         return Faces(elements, np.full(len(elements), side))
 
@@ -298,9 +296,11 @@ def _generated(mesh: DeckMesh, card: Card, what: str, known: np.ndarray) -> np.n
         by = int(step[0]) if step and step[0] else 1
         if last < first or by < 1:
             raise card.error(
-                f"GENERATE needs a first number, a last one that is not smaller, and an increment above "
-                f"zero, got {card.lines[row].strip()!r}", row,
-            )  # fmt: skip
+                f"GENERATE needs first ≤ last and an increment above zero, got {card.lines[row].strip()!r}: "
+                "correct "
+                "them",
+                row,
+            )
         wanted |= (known >= int(first)) & (known <= int(last)) & ((known - int(first)) % by == 0)
     return np.flatnonzero(wanted)
 

@@ -62,9 +62,12 @@ def test_another_closure_holds_from_its_step_on(tmp_path: Path) -> None:
     [
         (
             "*MODEL CHANGE, TYPE=ELEMENT, REMOVE\nUP\n",
-            r"contact pairs are switched off and on, .* got TYPE=ELEM",
+            r"needs TYPE=CONTACT PAIR and REMOVE or ADD, got TYPE=ELEM",
         ),
-        ("*MODEL CHANGE, TYPE=CONTACT PAIR\nFEET, TABLE\n", r"with TYPE=CONTACT PAIR and REMOVE or ADD, got"),
+        (
+            "*MODEL CHANGE, TYPE=CONTACT PAIR\nFEET, TABLE\n",
+            r"needs TYPE=CONTACT PAIR and REMOVE or ADD, got",
+        ),
         (
             "*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nFEET, CHAIR\n",
             r"no contact pair of these surfaces; the deck has FEET, TABLE",
@@ -77,7 +80,7 @@ def test_another_closure_holds_from_its_step_on(tmp_path: Path) -> None:
         ("*FRICTION\n0.1\n", r"must follow \*CHANGE FRICTION within a step"),
         (
             "*CHANGE SURFACE BEHAVIOR, INTERACTION=DRY\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TIED\n",
-            r"surfaces that stay together are a tie, which acts in all steps",
+            r"a step cannot change TIED",
         ),
     ],
     ids=lambda text: text[:30],
@@ -98,7 +101,5 @@ def test_slaves_are_adjusted_by_a_set_with_all_of_their_nodes(tmp_path: Path) ->
     found = read_deck(deck(tmp_path, pressed(contact)))
     assert found.scene.contacts[0].gap == 0.0
     some = "*NSET, NSET=SOME\n19, 20\n" + law("HARD") + PAIR.replace("TYPE", "ADJUST=SOME, TYPE")
-    with pytest.raises(
-        DeckError, match=r"ADJUST=SOME must be a distance, or a set with all nodes of the slave"
-    ):
+    with pytest.raises(DeckError, match=r"ADJUST=SOME must have all nodes of the slave"):
         read_deck(deck(tmp_path, pressed(some)))

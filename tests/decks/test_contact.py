@@ -114,7 +114,11 @@ WRONG = [
     (PAIR.replace("TABLE", "CHAIR"), "FEET, CHAIR", r"surface 'CHAIR' is not there"),
     (PAIR.replace("FEET, TABLE", "FEET"), "FEET\n", r"needs a slave and a master surface in each line"),
     (PAIR.replace("SURFACE TO", "EDGE TO"), "*CONTACT", r"TYPE=EDGE TO SURFACE is not read"),
-    (PAIR.replace("TYPE", "ADJUST=LOW_Z0, TYPE"), "*CONTACT", r"ADJUST=LOW_Z0 must be a distance"),
+    (
+        PAIR.replace("TYPE", "ADJUST=LOW_Z0, TYPE"),
+        "*CONTACT",
+        r"ADJUST=LOW_Z0 must have all nodes of the slave",
+    ),
     (
         "*NSET, NSET=FEW\n1, 2\n" + PAIR.replace("TABLE", "FEW"),
         "FEET, FEW",

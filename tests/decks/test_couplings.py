@@ -113,11 +113,11 @@ def test_nodes_of_a_cylinder_turn_from_x_to_y(tmp_path: Path) -> None:
 
 #: Axes of nodes of a plate, what holds them, and the axis that is out of the plane.
 OUT_OF_THE_PLANE = [
-    ("1., 0., 0., 0., 0., 1.", "2", r"2, by \*TRANSFORM \(0, 0, 1\)"),
-    ("1., 0., 0., 0., 1., 1.", "2, 2, 0.01", r"2, by \*TRANSFORM \(0, 0.7071, 0.7071\)"),
+    ("1., 0., 0., 0., 0., 1.", "2", r"2 of node \d, \(0, 0, 1\)"),
+    ("1., 0., 0., 0., 1., 1.", "2, 2, 0.01", r"2 of node \d, \(0, 0.7071, 0.7071\)"),
     # The third one is −y, which holds the nodes, though plane elements have no third component.
-    ("1., 0., 0., 0., 0., 1.", "3", r"3, by \*TRANSFORM \(0, -1, 0\)"),
-    ("1., 0., 0., 0., 0., 1.", "1, 2", r"2, by \*TRANSFORM \(0, 0, 1\)"),
+    ("1., 0., 0., 0., 0., 1.", "3", r"3 of node \d, \(0, -1, 0\)"),
+    ("1., 0., 0., 0., 0., 1.", "1, 2", r"2 of node \d, \(0, 0, 1\)"),
 ]
 
 
@@ -132,7 +132,7 @@ def test_nodes_of_plane_elements_are_held_in_the_plane(
 ) -> None:
     text = _plate(axes, held)
     line = 1 + text.splitlines().index(f"BAR_X0, {held}")
-    with pytest.raises(DeckError, match=rf"line {line}\D.*\*BOUNDARY.* is held along its axis {message}"):
+    with pytest.raises(DeckError, match=rf"line {line}\D.*\*BOUNDARY: axis {message}"):
         read_deck(deck(tmp_path, text + step("*DLOAD\nBAR, P1, 1.\n")))
 
 
@@ -161,7 +161,7 @@ def test_plane_elements_take_no_forces_out_of_the_plane(
 ) -> None:
     plate = mesh_cards({"BAR": rectangle((0, 0), (2, 1), (2, 1))}, "CPE4") + STEEL + SECTION
     held = plate + before + "*BOUNDARY\nBAR_X0, 1, 2\n"
-    message = rf"\*STEP.* along x and y and moments about z, node {node} has others by \*CLOAD"
+    message = rf"\*STEP.* node {node} has a \*CLOAD"
     with pytest.raises(DeckError, match=message):
         read_deck(deck(tmp_path, held + step(f"*CLOAD\n{load}\n")))
     allowed = "*CLOAD\n5, 1, 2.\n5, 3, 0.\n" + "90, 6, 1.\n" * (before == DRIVEN)
@@ -172,7 +172,7 @@ def test_plane_elements_take_no_forces_out_of_the_plane(
 def test_equations_of_plane_elements_are_along_axes_in_the_plane(terms: str, tmp_path: Path) -> None:
     plate = mesh_cards({"BAR": rectangle((0, 0), (2, 1), (2, 1))}, "CPE4") + STEEL + SECTION
     held = plate + OBLIQUE + "*BOUNDARY\nBAR_X0, 1, 2\n"
-    with pytest.raises(DeckError, match=r"component 2 of node \d of plane elements is along an axis of"):
+    with pytest.raises(DeckError, match=r"axis 2 of node \d is out of the plane"):
         read_deck(deck(tmp_path, held + f"*EQUATION\n{terms}\n" + step("*CLOAD\n5, 1, 2.\n")))
     in_plane = f"*EQUATION\n{terms}\n".replace(", 2, ", ", 1, ")
     assert read_deck(deck(tmp_path, held + in_plane + step("*CLOAD\n5, 1, 2.\n"))).steps
@@ -249,7 +249,7 @@ def test_bodies_that_share_nodes_but_no_faces_are_joined_there(tmp_path: Path) -
 WRONG = [
     (
         "*TRANSFORM, NSET=REF, TYPE=R\n0., 1., 0., -1., 0., 0.\n" + KINEMATIC,
-        r"the node of a rigid surface must move along x, y and z",
+        r"the node of a rigid surface must not have a",
     ),
     (
         RIGID.replace("NSET=BAR_X1", "ELSET=FEW").replace("*RIGID", "*ELSET, ELSET=FEW\n1, 2\n*RIGID"),
@@ -259,11 +259,11 @@ WRONG = [
     (KINEMATIC.replace("*KINEMATIC\n1, 6\n", ""), r"must be followed by \*KINEMATIC or \*DISTRIBUTING"),
     (KINEMATIC.replace("1, 6", "1, 2"), r"moves as one piece where components 1 to 3 are coupled"),
     (KINEMATIC.replace("COUPLING,", "COUPLING, ORIENTATION=A,"), r"ORIENTATION is not read here"),
-    (SPREAD + "*BOUNDARY\n501, 1\n", r"a distributing coupling takes forces, but its node is held"),
-    ("*BOUNDARY\n17, 4, 4, 0.1\n", r"nodes of solid elements have no rotation, but 17 is turned"),
+    (SPREAD + "*BOUNDARY\n501, 1\n", r"the node of a distributing coupling is held"),
+    ("*BOUNDARY\n17, 4, 4, 0.1\n", r"17 has no rotation that can be prescribed"),
     ("*EQUATION\n2\n17, 1, 1., 18, 4, 2.\n", r"component 4 of a node of elements is no displacement"),
     ("*EQUATION\n1\n501, 1, 1.\n", r"needs a node of an element"),
-    ("*EQUATION\n2\n17, 1, 1., 501, 1, 1.\n", r"node 501 belongs to no element, its component 1"),
+    ("*EQUATION\n2\n17, 1, 1., 501, 1, 1.\n", r"node 501 belongs to no element: give component 1"),
     ("*EQUATION\n2\n17, 1, 1.\n", r"needs 2 terms of node, component and factor"),
     ("*EQUATION\n2\nBAR_X1, 1, 1., 18, 1, -1.\n", r"needs single nodes, got a set of several"),
     ("*EQUATION, REMOVE\n1\n", r"REMOVE is not read"),
@@ -283,5 +283,5 @@ WRONG = [
 def test_what_couples_nothing_is_refused(cards: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(DeckError, match=message):
         read_deck(deck(tmp_path, BAR + REFERENCE + FIXED + cards + step("*CLOAD\n501, 1, 1.\n")))
-    with pytest.raises(DeckError, match=r"nodes of solid elements take no moments, node 17 has one"):
+    with pytest.raises(DeckError, match=r"node 17 of a solid takes no moment"):
         read_deck(deck(tmp_path, BAR + FIXED + step("*CLOAD\n17, 5, 1.\n")))

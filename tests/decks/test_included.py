@@ -86,7 +86,7 @@ def test_keywords_are_read_as_people_write_them(tmp_path: Path, case: str) -> No
 
 def test_data_behind_an_asterisk_alone_belong_to_no_card(tmp_path: Path) -> None:
     """CalculiX warns of each such line and leaves it out."""
-    with pytest.raises(DeckError, match=r"line \d+: data cannot follow an asterisk alone, which is no card"):
+    with pytest.raises(DeckError, match=r"line \d+: data cannot follow an asterisk alone: name a card"):
         read_deck(deck(tmp_path, HEAD + "*\n" + FORCES + TAIL))
 
 

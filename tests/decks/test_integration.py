@@ -43,7 +43,7 @@ def test_a_body_has_one_integration(tmp_path: Path) -> None:
     lines = mesh_cards({"BAR": COLUMN}, "C3D20").splitlines()
     place = next(k for k, line in enumerate(lines) if line.startswith("*ELEMENT")) + 3
     lines.insert(place, "*ELEMENT, TYPE=C3D20R, ELSET=BAR")
-    with pytest.raises(DeckError, match="reduced integration or none"):
+    with pytest.raises(DeckError, match="of full and of reduced integration"):
         read_deck(deck(tmp_path, "\n".join(lines) + "\n" + STEEL + SECTION + NOTHING))
 
 

@@ -21,7 +21,7 @@ GOOD = (
 
 #: What is changed, into what, and what the message says, with the text of the line that it must name.
 WRONG = [
-    ("*STATIC", "*FREQUENCY\n10", "FREQUENCY", r"\*FREQUENCY: only \*STATIC is solved here"),
+    ("*STATIC", "*FREQUENCY\n10", "FREQUENCY", r"\*FREQUENCY: only \*STATIC is solved: leave"),
     ("*STATIC", "*FANCY CARD\n*STATIC", "FANCY", r"\*FANCY CARD: this card is not known: the guide lists"),
     ("BAR_X1, 1, 10.", "BAR_X9, 1, 10.", "BAR_X9", r"node set 'BAR_X9' is not there; did you mean BAR_X\d\?"),
     ("BAR_X1, 1, 10.", "99, 1, 10.", "99, 1", r"\*CLOAD: node 99 is not there: correct the number"),
@@ -77,7 +77,7 @@ WRONG = [
         "*CLOAD\nBAR_X1, 1, 10.",
         "*DLOAD\nBAR, P7, 1.",
         "P7",
-        r"face 'P7' is not one of element type C3D8, whose faces are P1 to P6",
+        r"C3D8 has faces P1 to P6, got 'P7'",
     ),
     ("*CLOAD\nBAR_X1, 1, 10.", "*DLOAD\nBAR, P4, 1.", "P4", r"a face of element 1 lies between two elements"),
     (
@@ -100,7 +100,7 @@ WRONG = [
         r"amplitude 'UP' is not there; the deck has none",
     ),
     ("BAR_X1, 1, 10.", "BAR_X1, 1", "BAR_X1, 1\n", r"needs node or set, component and force"),
-    ("*STEP", "*STEP, PERTURBATION", "*STEP", r"PERTURBATION is not read"),
+    ("*STEP", "*STEP, PERTURBATION", "*STEP", r"PERTURBATION is not supported"),
     ("*END STEP", "", "*STEP", r"has no \*END STEP: add it"),
     ("*STATIC\n0.1, 1.\n", "", "*STEP", r"needs \*STATIC: nothing else is solved here"),
     ("*STEP\n", "*CLOAD\nBAR_X1, 1, 1.\n*STEP\n", "*CLOAD", r"must be between \*STEP and \*END STEP"),
@@ -108,7 +108,7 @@ WRONG = [
         "*STEP\n",
         "*NSET, NSET=ODD, GENERATE\n9, 1, 2\n*STEP\n",
         "9, 1, 2",
-        r"GENERATE needs a first number, a last one",
+        r"GENERATE needs first ≤ last",
     ),
     (
         "*STEP\n",
@@ -166,7 +166,7 @@ WRONG = [
         "*ELASTIC\n210000., 0.3",
         "*ELASTIC, TYPE=ORTHO\n0., 0., 0., 0., 0., 1000., 0., 300.,\n300.",
         "*ELASTIC",
-        r"every stretch stores energy, .* eigenvalue 0 beside 1e\+03: give directions without stiffness",
+        r"stiffnesses must be positive definite, got the smallest eigenvalue 0",
     ),
     ("*CLOAD\n", "*CLOAD, LOAD CASE=2\n", "*CLOAD", r"the parameter LOADCASE is not read: AMPLITUDE, NAME"),
     ("*CLOAD\n", "*CLOAD, TIME DELAY=1.\n", "*CLOAD", r"TIME DELAY needs an AMPLITUDE"),
@@ -194,7 +194,7 @@ def test_a_mistake_is_refused_at_its_line(
 
 def test_a_deck_without_nodes_elements_or_cards_is_refused(tmp_path: Path) -> None:
     for text, message in (
-        ("x = 1\n", "a deck must have cards that begin with an asterisk"),
+        ("x = 1\n", "a deck must have cards such as"),
         ("1, 2\n*NODE\n1, 0., 0.\n", "data must follow a card, got '1, 2'"),
         ("*HEADING\n", "a deck must have nodes"),
         ("*NODE\n1, 0., 0.\n", "a deck must have elements"),

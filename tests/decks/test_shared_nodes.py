@@ -101,20 +101,23 @@ def test_bolts_of_plane_bodies_have_their_force_over_the_thickness(
 
 
 WRONG = [
-    (RIGID.format("A_Z1") + "*RIGID BODY, NSET=B_Z1, REF NODE=21\n", r"shares one of its nodes with 'A_Z1'"),
+    (
+        RIGID.format("A_Z1") + "*RIGID BODY, NSET=B_Z1, REF NODE=21\n",
+        r"must share both REF NODE and ROT NODE with 'A_Z1'",
+    ),
     (
         RIGID.format("A_Z1") + RIGID.format("B_Z1").replace("=21", "=23"),
-        r"need the same REF NODE and the same ROT NODE",
+        r"must share both REF NODE and ROT NODE with 'A_Z1'",
     ),
     (
         COUPLED.replace("*KINEMATIC\n1, 3\n*SURFACE", "*DISTRIBUTING\n*SURFACE"),
-        r"node 21 is the reference node of 'CA', too, and a distributing coupling shares its force",
+        r"node 21 of a distributing coupling is also that of 'CA'",
     ),
     (
         "*SURFACE, NAME=CA\n1, S1\n*SURFACE, NAME=CB\n2, S1\n" + "".join(
             f"*PRE-TENSION SECTION, SURFACE=C{name}, NODE=21\n" for name in "AB"
         ),
-        r"\*PRE-TENSION SECTION: node 21 is that of a card before, too, and its force would act twice",
+        r"\*PRE-TENSION SECTION: node 21 is used by a card before",
     ),
 ]  # fmt: skip
 

@@ -72,7 +72,7 @@ def test_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:
         read_deck(deck(tmp_path, text))
     driven = BAR + "*NODE\n501, 3., 0.5, 0.5\n*RIGID BODY, NSET=BAR_X1, REF NODE=501\n" + FREE_TO_CONTRACT
     driven += step("*CLOAD\n501, 1, 9.\n") + step("*BOUNDARY, FIXED\n501, 1\n")
-    with pytest.raises(DeckError, match=r"node 501, which drives a surface, was free before it is FIXED"):
+    with pytest.raises(DeckError, match=r"node 501 drives a surface and was free before FIXED"):
         read_deck(deck(tmp_path, driven))
 
 
@@ -143,7 +143,9 @@ def test_nodes_on_the_axis_of_a_cylinder_are_held_across_it_as_a_whole(tmp_path:
     np.testing.assert_allclose(
         turned.gather_displacement("BAR"), expected, atol=1e-9 * np.abs(expected).max()
     )
-    with pytest.raises(DeckError, match=r"node 1 is on the axis of the cylinder, .* hold both at zero"):
+    with pytest.raises(
+        DeckError, match=r"node 1 is on the axis of the cylinder: hold components 1 and 2 both at zero"
+    ):
         read_deck(deck(tmp_path, rolling))
 
 
@@ -190,7 +192,10 @@ def test_lines_of_single_elements_that_are_always_equal_are_one_load(tmp_path: P
 def test_what_is_wrong_in_lines_of_single_elements_is_named_by_its_line(tmp_path: Path) -> None:
     plate = mesh_cards({"BAR": block((0, 0, 0), (2, 1, 1), (2, 1, 1))}) + STEEL + SECTION + ON_ITS_BACK
     lines = (plate + step("*DLOAD\n1, P2, 6.\n2, P2, 6.\n")).splitlines()
-    for wrong, message in (("7, P2, 6.", "element 7 is not there"), ("2, P9, 6.", "face 'P9' is not one of")):
+    for wrong, message in (
+        ("7, P2, 6.", "element 7 is not there"),
+        ("2, P9, 6.", "got 'P9': correct the label"),
+    ):
         text = "\n".join(wrong if line == "2, P2, 6." else line for line in lines)
         with pytest.raises(DeckError, match=message) as refused:
             read_deck(deck(tmp_path, text))
