@@ -27,7 +27,7 @@ from fenics_contact.decks.vocabulary import PROCEDURES
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.readers.deck_assembly import read_cards
-from fenics_contact.readers.deck_cards import Card, DeckError, Instances, Origin
+from fenics_contact.readers.deck_cards import NO_INSTANCES, Card, DeckError, Instances, Origin
 from fenics_contact.readers.deck_mesh import MeshCards
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Deck:
         element_sets: Name -> numbers of elements in the deck, ascending.
         mesh: Its mesh with sets and surfaces named as in the scene.
         instances: How the numbers above are those of instances of parts, whose nodes and elements have other
-            numbers there; None without any.
+            numbers there; one without a name where there are none.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Deck:
     node_sets: Mapping[str, np.ndarray]
     element_sets: Mapping[str, np.ndarray]
     mesh: MeshCards = field(repr=False)
-    instances: Instances | None = field(default=None, repr=False)
+    instances: Instances = field(default=NO_INSTANCES, repr=False)
     _origins: Mapping[tuple[str, str], Origin] = field(default_factory=dict, repr=False)
 
     def _facts(self) -> dict[str, Any]:
@@ -139,7 +139,7 @@ class Deck:
 
     def _in_instances(self, table: PrintTable) -> PrintTable:
         """Return a table with the numbers that nodes and elements have in their instances."""
-        if self.instances is None:
+        if len(self.instances.names) == 1:
             return table
         names, own = self.instances.own(table.rows[:, 0])
         return replace(table, rows=np.column_stack([own, table.rows[:, 1:]]), instances=tuple(names))

@@ -78,7 +78,7 @@ def relieved(strain: np.ndarray, material: Material, card: Card) -> np.ndarray:
 def _at_points(card: Card, mesh: DeckMesh, stress: np.ndarray, note: Callable[[Card, str], None]) -> None:
     """Give elements the mean stress of their integration points, in place."""
     table = card.numbers_alone
-    if table is None:
+    if not table.size:
         table = np.array([card.floats(row) for row in range(len(card.rows))])
     element = mesh.positions(card.wholes(table[:, 0]), "element", card, by_row=True)
     point, given = card.wholes(table[:, 1]), table[:, 2:]

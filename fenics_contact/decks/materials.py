@@ -171,9 +171,10 @@ def _row(card: Card, width: int, of: Conditions, what: str) -> list[float]:
     return row_at(card, width, of.temperature or 0.0, what)
 
 
-def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> list[float] | None:
+def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> tuple[float, ...]:
+    """Return the coefficients of expansion, without any nothing, or zeros where other materials expand."""
     if "EXPANSION" not in parts:
-        return [0.0] * count if of.expands else None
+        return (0.0,) * count if of.expands else ()
     card = parts["EXPANSION"]
     kind = card.name_of("TYPE") or "ISO"
     width = {"ISO": 1, "ORTHO": 3, "ANISO": 6, "ANISOTROPIC": 6}.get(kind, 0)
@@ -183,10 +184,10 @@ def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> list[fl
         )
     if of.temperature is None and depends_on_temperature(card, width):
         raise card.error("the expansion of this material must not depend on the temperature: give its mean")
-    values = row_at(card, width, of.temperature or 0.0, "an expansion")
+    values = tuple(row_at(card, width, of.temperature or 0.0, "an expansion"))
     if count == 6:
         along = values[:3] if width > 1 else values * 3
-        return [*along, *(values[k] for k in (5, 4, 3))] if width == 6 else [*along, 0.0, 0.0, 0.0]
+        return (*along, *(values[k] for k in (5, 4, 3))) if width == 6 else (*along, 0.0, 0.0, 0.0)
     return values if len(values) == count else values * count
 
 
@@ -236,8 +237,7 @@ def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
         if of.kind == "plane stress":
             raise parts["ELASTIC"].error("plane stress with NLGEOM has no counterpart: take solid elements")
         return StVenantKirchhoff(young, poisson, **_heated(parts, of))
-    alpha = _expansion(parts, of, 1)
-    expansion = None if alpha is None else alpha[0]
+    expansion = next(iter(_expansion(parts, of, 1)), None)
     if of.kind in ("plane strain", "plane stress"):
         kind = PlaneStrain if of.kind == "plane strain" else PlaneStress
         return kind(young, poisson, expansion, of.thickness)
@@ -273,8 +273,8 @@ def _plastic(parts: Mapping[str, Card], young: float, poisson: float, of: Condit
 
 def _heated(parts: Mapping[str, Card], of: Conditions) -> dict[str, Any]:
     """Return the expansion of a nonlinear material, which costs forms of its own, where it is heated."""
-    alpha = _expansion(parts, of, 1) if of.heated else None
-    return {} if alpha is None else {"thermal_expansion": alpha[0]}
+    alpha = _expansion(parts, of, 1) if of.heated else ()
+    return {"thermal_expansion": alpha[0]} if alpha else {}
 
 
 def _curve(card: Card) -> tuple[float, Points]:
@@ -308,13 +308,11 @@ def _orthotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
         if abs(rows[2][2]) < 1.0 - 1e-9:
             raise card.error("axes of a plane material must lie in the plane: correct *ORIENTATION")
         angle = float(np.arctan2(rows[0][1], rows[0][0]))
-        return OrthotropicPlaneStress(
-            (e1, e2), n12, g12, angle, None if alpha is None else (alpha[0], alpha[1]), of.thickness
-        )
+        plane = (alpha[0], alpha[1]) if alpha else None
+        return OrthotropicPlaneStress((e1, e2), n12, g12, angle, plane, of.thickness)
     if of.kind == "plane strain":
         raise card.error(f"TYPE={kind} in plane strain has no counterpart: take solid elements")
-    thermal = None if alpha is None else (alpha[0], alpha[1], alpha[2])
-    return OrthotropicElasticity((e1, e2, e3), (n12, n13, n23), (g12, g13, g23), rows, thermal)  # type: ignore[arg-type]
+    return OrthotropicElasticity((e1, e2, e3), (n12, n13, n23), (g12, g13, g23), rows, alpha or None)  # type: ignore[arg-type]
 
 
 def _compliance(card: Card, moduli: np.ndarray, least: float = 1e-12) -> np.ndarray:
@@ -348,9 +346,7 @@ def _anisotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
     moduli = np.zeros((6, 6))
     column, row = np.tril_indices(6)  # the upper triangle column by column
     moduli[_IN_VOIGT[row], _IN_VOIGT[column]] = moduli[_IN_VOIGT[column], _IN_VOIGT[row]] = values
-    alpha = _expansion(parts, of, 6)
-    thermal = None if alpha is None else tuple(alpha)
-    return AnisotropicElasticity(moduli, _axes(axes), thermal)  # type: ignore[arg-type]
+    return AnisotropicElasticity(moduli, _axes(axes), _expansion(parts, of, 6) or None)  # type: ignore[arg-type]
 
 
 def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:

@@ -516,7 +516,7 @@ def _held(card: Card, mesh: DeckMesh, by: int) -> Iterator[Held]:
     if card.name_of("TYPE") not in ("", "DISPLACEMENT"):
         raise card.error(f"TYPE={card.name_of('TYPE')} is not read: prescribe displacements")
     table = card.numbers_alone
-    if table is None or table.shape[1] < 2:
+    if table.shape[1] < 2:
         for row, entries in enumerate(card.rows):
             nodes = mesh.nodes_named(entries[0], card, row)
             components, number = _components(card, row, entries)
@@ -536,7 +536,7 @@ def _held(card: Card, mesh: DeckMesh, by: int) -> Iterator[Held]:
 def _forces(card: Card, mesh: DeckMesh) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield nodes, components and forces of a card; of single nodes by their numbers at once."""
     table = card.numbers_alone
-    if table is not None and table.shape[1] > 2 and ((table[:, 1] >= 1) & (table[:, 1] <= 6)).all():
+    if table.shape[1] > 2 and ((table[:, 1] >= 1) & (table[:, 1] <= 6)).all():
         nodes = mesh.positions(card.wholes(table[:, 0]), "node", card, by_row=True)
         yield nodes, card.wholes(table[:, 1]) - 1, table[:, 2]
         return
@@ -607,7 +607,7 @@ def _check_single_faces(card: Card, mesh: DeckMesh) -> None:
 def _temperatures(card: Card, mesh: DeckMesh) -> Iterator[tuple[np.ndarray, Any]]:
     """Yield nodes of a card and their temperatures."""
     table = card.numbers_alone
-    if table is not None and table.shape[1] > 1:
+    if table.shape[1] > 1:
         yield mesh.positions(card.wholes(table[:, 0]), "node", card, by_row=True), table[:, 1]
         return
     for row, entries in enumerate(card.rows):

@@ -97,24 +97,23 @@ def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Placed(Card):
     """Nodes or elements of an instance: with its numbers, nodes in its place."""
 
-    instance: _Instance | None = None
-    offset: int = 0
+    instance: _Instance
+    offset: int
 
     @property
     def body(self) -> str:
         """Name of the instance."""
-        return "" if self.instance is None else self.instance.name
+        return self.instance.name
 
     def table(self, columns: int) -> np.ndarray:
         """Return nodes as the card has them, in the place of the instance."""
         found = super().table(columns)
-        if self.instance is not None:
-            found[:, 0] += self.offset
-            found[:, 1:4] = self.instance.moved(found[:, 1:4])
+        found[:, 0] += self.offset
+        found[:, 1:4] = self.instance.moved(found[:, 1:4])
         return found
 
     def integers(self, width: int) -> np.ndarray:

@@ -81,8 +81,13 @@ class Instances:
 
     def own(self, numbers: np.ndarray) -> tuple[list[str], np.ndarray]:
         """Return for numbers of the flat deck the instances, "" for none, and the numbers within these."""
-        place, rest = np.divmod(np.asarray(numbers, dtype=np.int64), self.stride)
-        return [self.names[k] for k in place.tolist()], rest
+        numbers = np.asarray(numbers, dtype=np.int64)
+        place = np.minimum(numbers // self.stride, len(self.names) - 1)
+        return [self.names[k] for k in place.tolist()], numbers - place * self.stride
+
+
+#: Those of a deck without parts.
+NO_INSTANCES = Instances(("",), 2**63 - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +99,7 @@ class Card:
         parameters: Names in capitals without blanks -> values as written, "" for flags.
         lines: Data lines without comments and blank lines.
         numbers: Numbers of the data lines in their files.
-        instances: Those of the deck; None without any.
+        instances: Those of the deck.
         files: Names of the files of the data lines, where not all are of that of the keyword.
     """
 
@@ -105,7 +110,7 @@ class Card:
     numbers: Sequence[int]
     line: int
     file: str
-    instances: Instances | None = None
+    instances: Instances = NO_INSTANCES
     files: Sequence[str] = ()
 
     @property
@@ -115,10 +120,8 @@ class Card:
 
     def label(self, number: int) -> str:
         """Return how a node or element is called in the deck: "5", or "BOLT-1.5" of an instance."""
-        if self.instances is None or number < self.instances.stride:
-            return str(number)
         (name,), (own,) = self.instances.own(np.array([number]))
-        return f"{name}.{own}"
+        return f"{name}.{own}" if name else str(own)
 
     @property
     def origin(self) -> Origin:
@@ -227,12 +230,12 @@ class Card:
         return result
 
     @cached_property
-    def numbers_alone(self) -> np.ndarray | None:
-        """The data lines as rows of numbers, None where lines are not alike or hold names."""
+    def numbers_alone(self) -> np.ndarray:
+        """The data lines as rows of numbers, without columns where lines are not alike or hold names."""
         text = [line.rstrip().rstrip(",") for line in self.lines]
         count = {line.count(",") for line in text}
         values = _numbers(",".join(text), float) if len(count) == 1 else None
-        return None if values is None else values.reshape(len(text), -1)
+        return np.zeros((0, 0)) if values is None else values.reshape(len(text), -1)
 
     def integers(self, width: int) -> np.ndarray:
         """Return records of a number of integers each, which may go over several lines, shape (n, width)."""
