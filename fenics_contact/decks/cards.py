@@ -197,4 +197,4 @@ def steps_of(deck: DeckCards) -> DeckSteps:
     def shared(forces: np.ndarray) -> np.ndarray:
         return shared_out(in_global_axes(forces, deck.axes.rows), deck.means) / deck.thickness
 
-    return steps.with_forces(shared, equations)
+    return replace(steps.with_forces(shared), equations=equations)

@@ -135,7 +135,7 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
         ]
         if of.thickness is not None and stiff:
             raise cards.card.error(
-                f"plane bodies of several thicknesses with {stiff[0]} have no counterpart: give one thickness"
+                f"plane bodies of several thicknesses with {stiff[0]} are not supported: give one thickness"
             )
         for name, build in WITHOUT_ELASTIC.items():
             if name in parts:
@@ -153,7 +153,7 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
         if "PLASTIC" in parts or of.large:
             what = "*PLASTIC" if "PLASTIC" in parts else "NLGEOM"
             raise parts["ELASTIC"].error(
-                f"TYPE={kind} with {what} has no counterpart: give isotropic constants"
+                f"TYPE={kind} with {what} is not supported: give isotropic constants"
             )
         return (_anisotropic if kind == "ANISO" else _orthotropic)(parts, kind, axes, of)
     except InvalidInputError as error:
@@ -179,9 +179,7 @@ def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> tuple[f
     kind = card.name_of("TYPE") or "ISO"
     width = {"ISO": 1, "ORTHO": 3, "ANISO": 6, "ANISOTROPIC": 6}.get(kind, 0)
     if not 0 < width <= count:
-        raise card.error(
-            f"TYPE={kind} is not read for this material: give ISO, ORTHO or ANISO as *ELASTIC has"
-        )
+        raise card.error(f"TYPE={kind} must be ISO, ORTHO or ANISO as *ELASTIC has: correct it")
     if of.temperature is None and depends_on_temperature(card, width):
         raise card.error("the expansion of this material must not depend on the temperature: give its mean")
     values = tuple(row_at(card, width, of.temperature or 0.0, "an expansion"))
@@ -208,7 +206,7 @@ def _by_temperature(parts: Mapping[str, Card], of: Conditions) -> Material:
     if of.initial is None or of.thickness is not None:
         what = "several initial temperatures" if of.initial is None else "several thicknesses"
         raise card.error(
-            f"constants that depend on the temperature with {what} have no counterpart: give one of them"
+            f"constants that depend on the temperature are not supported with {what}: give one of them"
         )
     young, poisson = (_curve_of(card, 2, column) for column in range(2))
     expansion: ByTemperature | None = 0.0 if of.expands else None
@@ -235,7 +233,7 @@ def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
         return _plastic(parts, young, poisson, of)
     if of.large:
         if of.kind == "plane stress":
-            raise parts["ELASTIC"].error("plane stress with NLGEOM has no counterpart: take solid elements")
+            raise parts["ELASTIC"].error("plane stress with NLGEOM is not supported: take solid elements")
         return StVenantKirchhoff(young, poisson, **_heated(parts, of))
     expansion = next(iter(_expansion(parts, of, 1)), None)
     if of.kind in ("plane strain", "plane stress"):
@@ -248,9 +246,7 @@ def _plastic(parts: Mapping[str, Card], young: float, poisson: float, of: Condit
     """Return a metal; tables are of true stress over logarithmic plastic strain where strains are large."""
     card = parts["PLASTIC"]
     if of.kind == "plane stress":
-        raise card.error(
-            "plane stress with plasticity has no counterpart: take solid or plane strain elements"
-        )
+        raise card.error("plane stress with plasticity is not supported: take solid or plane strain elements")
     kind = card.name_of("HARDENING") or "ISOTROPIC"
     if kind not in ("ISOTROPIC", "KINEMATIC", "COMBINED"):
         raise card.error(f"HARDENING must be ISOTROPIC, KINEMATIC or COMBINED, got {kind}: give one of them")
@@ -311,7 +307,7 @@ def _orthotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
         plane = (alpha[0], alpha[1]) if alpha else None
         return OrthotropicPlaneStress((e1, e2), n12, g12, angle, plane, of.thickness)
     if of.kind == "plane strain":
-        raise card.error(f"TYPE={kind} in plane strain has no counterpart: take solid elements")
+        raise card.error(f"TYPE={kind} in plane strain is not supported: take solid elements")
     return OrthotropicElasticity((e1, e2, e3), (n12, n13, n23), (g12, g13, g23), rows, alpha or None)  # type: ignore[arg-type]
 
 
@@ -341,7 +337,7 @@ _IN_VOIGT = np.array([0, 1, 2, 5, 4, 3])
 def _anisotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Conditions) -> Material:
     card = parts["ELASTIC"]
     if of.kind in ("plane stress", "plane strain"):
-        raise card.error(f"TYPE={kind} in {of.kind} has no counterpart: take solid elements")
+        raise card.error(f"TYPE={kind} in {of.kind} is not supported: take solid elements")
     values = _row(card, 21, of, "21 stiffnesses")
     moduli = np.zeros((6, 6))
     column, row = np.tril_indices(6)  # the upper triangle column by column
@@ -354,7 +350,7 @@ def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:
     if not of.large:
         raise card.error("needs NLGEOM in its *STEP, as rubber is for large deformations: add it")
     if of.kind == "plane stress":
-        raise card.error("plane stress with rubber has no counterpart: take solid or plane strain elements")
+        raise card.error("plane stress with rubber is not supported: take solid or plane strain elements")
     flags, order = set(card.parameters), _order(card)
     if flags & {"NEOHOOKE"}:
         c10, d1 = _row(card, 2, of, "C10 and D1")
@@ -365,7 +361,7 @@ def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:
         values = _row(card, 3 * order, of, "μ, α and D of each term")
         pairs, volumes = np.array(values[: 2 * order]).reshape(-1, 2), values[2 * order :]
         if any(volumes[1:]):
-            raise card.error("D2, D3, ... of *HYPERELASTIC, OGDEN have no counterpart: give them as zero")
+            raise card.error("compressibility terms D2, D3, ... are not supported: set them to 0")
         if not pairs[:, 1].all():
             raise card.error("exponents α must not be zero, got one that is: leave the term out")
         moduli = tuple(float(2 * mu / alpha) for mu, alpha in pairs)
@@ -374,8 +370,8 @@ def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:
         return Ogden(moduli, exponents, bulk, mean_dilatation=of.dilatation, **own)
     else:
         raise card.error(
-            f"the model {', '.join(sorted(flags)) or 'POLYNOMIAL'} has no counterpart: NEO HOOKE, "
-            "MOONEY-RIVLIN and OGDEN have"
+            f"the model {', '.join(sorted(flags)) or 'POLYNOMIAL'} is not supported: give NEO HOOKE, "
+            "MOONEY-RIVLIN or OGDEN"
         )
     bulk = _bulk(d1, 2.0 * (c10 + c01))
     return MooneyRivlin(c10, c01, bulk, mean_dilatation=of.dilatation, **_heated(parts, of))
@@ -403,7 +399,7 @@ def _require_large_solid(card: Card, of: Conditions) -> None:
     if not of.large:
         raise card.error("needs NLGEOM in its *STEP, as it is for large deformations: add it")
     if of.kind == "plane stress":
-        raise card.error("has no counterpart in plane stress: take solid or plane strain elements")
+        raise card.error("is not supported in plane stress: take solid or plane strain elements")
 
 
 #: Cards of materials that need no *ELASTIC.

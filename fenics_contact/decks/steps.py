@@ -368,15 +368,13 @@ class DeckSteps:
         """Whether any step has NLGEOM."""
         return any(step.large for step in self.steps)
 
-    def with_forces(
-        self, change: Callable[[np.ndarray], np.ndarray], equations: Sequence[Equation]
-    ) -> DeckSteps:
-        """Return the steps with other forces on nodes, (n_nodes, 6), and with equations."""
+    def with_forces(self, change: Callable[[np.ndarray], np.ndarray]) -> DeckSteps:
+        """Return the steps with other forces on nodes, (n_nodes, 6)."""
         steps = [
             replace(step, instants=[replace(each, forces=change(each.forces)) for each in step.instants])
             for step in self.steps
         ]
-        return replace(self, steps=steps, equations=equations)
+        return replace(self, steps=steps)
 
 
 def read_steps(cards: Sequence[Card], mesh: DeckMesh) -> DeckSteps:
@@ -458,17 +456,13 @@ def _name(head: Card, before: Sequence[Step]) -> str:
 def _check_step(head: Card, group: Sequence[Card]) -> None:
     """Reject steps that are not static, perturbations, and other amplitudes of all loads than two."""
     if "PERTURBATION" in head.parameters:
-        raise head.error(
-            "PERTURBATION is not supported: give all loads, or read the steps before alone (statics_only)"
-        )
+        raise head.error("PERTURBATION is not supported: give all loads, or read with statics_only")
     amplitude = head.name_of("AMPLITUDE") or "RAMP"
     if amplitude not in ("RAMP", "STEP"):
         raise head.error(f"AMPLITUDE={amplitude} is not read: RAMP and STEP are")
     for card in group:
         if card.name in PROCEDURES:
-            raise card.error(
-                "only *STATIC is solved: leave this step out, or read the steps before alone (statics_only)"
-            )
+            raise card.error("only *STATIC is solved: leave this step out, or read with statics_only")
     if not any(card.name == "STATIC" for card in group):
         raise head.error("needs *STATIC: nothing else is solved here, add it")
 
@@ -568,9 +562,7 @@ def _distributed(card: Card, mesh: DeckMesh, by: int) -> Iterator[Acting]:
             if not where[0].isdecimal():
                 mesh.faces_of(mesh.elements_named(where[0], card, row), label, card, row)
         else:
-            raise card.error(
-                f"load {label!r} is not read: P1, P2, ... on faces of elements, GRAV and CENTRIF are", row
-            )
+            raise card.error(f"load {label!r} is not supported: give P1, P2, ..., GRAV or CENTRIF", row)
         yield Acting(card, row, where, numbers[0], numbers[1:], by)
 
 
@@ -620,17 +612,11 @@ def _temperatures(card: Card, mesh: DeckMesh) -> Iterator[tuple[np.ndarray, Any]
 def _check_span(card: Card, row: int, first: int, last: int) -> None:
     """Reject components that are no displacements or rotations."""
     if first < 1:
-        raise card.error(
-            "needs a node or set and the first component to hold, from 1: complete the line", row
-        )
+        raise card.error("needs a node or set and the first component, from 1: complete the line", row)
     if last < first:
-        raise card.error(
-            f"the first component must not be above the last, got {first} and {last}: exchange them", row
-        )
+        raise card.error(f"the first component must not be above the last, got {first} and {last}", row)
     if last > 6:
-        raise card.error(
-            f"component {last} is no displacement: 1 to 3, of nodes that drive rigid surfaces 4 to 6", row
-        )
+        raise card.error(f"components are displacements, 1 to 3, and rotations, 4 to 6, got {last}", row)
 
 
 def _components(card: Card, row: int, entries: Sequence[str]) -> tuple[range | tuple[int, ...], float]:
@@ -638,11 +624,7 @@ def _components(card: Card, row: int, entries: Sequence[str]) -> tuple[range | t
     named = {"XSYMM": (0,), "YSYMM": (1,), "ZSYMM": (2,), "PINNED": (0, 1, 2), "ENCASTRE": (0, 1, 2)}
     if len(entries) > 1 and plain(entries[1]) in named:
         return named[plain(entries[1])], 0.0
-    numbers = card.floats(row, 1)
-    if not numbers or numbers[0] < 1:
-        raise card.error(
-            "needs a node or set and the first component to hold, from 1: complete the line", row
-        )
+    numbers = card.floats(row, 1) or [0.0]
     first, *rest = card.wholes(np.array(numbers[:2]), row).tolist()
     last = rest[0] if rest and rest[0] else first
     _check_span(card, row, first, last)

@@ -63,7 +63,7 @@ def _of_card(card: Card) -> Iterator[str]:
         yield STRUCTURES.get(card.name, unknown)
         return
     if card.name == "RESTART" and "READ" in card.parameters:
-        yield "states of the other program are not read: give the steps from the start"
+        yield "restart files are not supported: supply all steps"
     for strange in sorted(set(card.parameters) - PARAMETERS.get(card.name, set(card.parameters))):
         there = ", ".join(sorted(PARAMETERS[card.name])) or "none"
         yield f"the parameter {strange} is not read: {there} can be"

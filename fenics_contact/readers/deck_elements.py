@@ -135,8 +135,8 @@ def element_of(card: Card) -> Element:
     if match is None or cell is None:
         what = next((words for start, words in _OTHERS.items() if name.startswith(start)), "")
         raise card.error(
-            f"elements of type {name}{what} have no counterpart: solid (C3D4, 6, 8, 10, 15, 20), plane (CPS, "
-            "CPE 3, 4, 6, 8) and axisymmetric ones (CAX) have; shells, beams, springs and others do not"
+            f"elements of type {name}{what} are not supported: give solids (C3D4, 6, 8, 10, 15, 20), plane "
+            "ones (CPS, CPE 3, 4, 6, 8) or axisymmetric ones (CAX)"
         )
     return Element(name, kind, cell, count, match.group(3))
 

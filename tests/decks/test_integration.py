@@ -82,7 +82,7 @@ def test_a_delay_shifts_an_amplitude(tmp_path: Path) -> None:
 
 def test_states_of_the_other_program_are_not_read(tmp_path: Path) -> None:
     text = mesh_cards({"BAR": CUBE}) + STEEL + SECTION + "*BOUNDARY\nBAR_X0, 1, 3\n"
-    with pytest.raises(DeckError, match="give the steps from the start"):
+    with pytest.raises(DeckError, match="supply all steps"):
         read_deck(deck(tmp_path, text + "*RESTART, READ, STEP=1\n" + NOTHING))
     found = read_deck(deck(tmp_path, text + "*RESTART, WRITE, FREQUENCY=1\n" + NOTHING))
     assert any("RESTART" in note for note in found.notes)

@@ -146,10 +146,10 @@ def test_21_stiffnesses_are_in_their_places(tmp_path: Path) -> None:
     [
         ("*ELASTIC, TYPE=ANISO\n1., 2., 1.\n", False, r"moduli must give a positive energy"),
         ("*DENSITY\n1.\n", False, r"needs \*ELASTIC or \*HYPERELASTIC behind it, has \*DENSITY"),
-        ("*HYPERELASTIC, YEOH\n1., 0.\n", True, r"the model YEOH has no counterpart"),
+        ("*HYPERELASTIC, YEOH\n1., 0.\n", True, r"the model YEOH is not supported"),
         ("*HYPERFOAM\n1., 2., 0.1\n", False, r"needs NLGEOM in its \*STEP"),
         ("*HYPERFOAM\n1., 2., 0.6\n", True, r"poisson_ratios must lie between 0 and 0.5"),
-        ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.2\n", True, r"D2, D3, \.\.\. of \*HYPERELASTIC"),
+        ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.2\n", True, r"compressibility terms D2, D3"),
         (STEEL + "*PLASTIC\n3., 0.1\n4., 0.2\n", False, r"a table must begin at plastic strain zero"),
         (STEEL + "*PLASTIC\n3., 0.\n4., 0.2\n5., 0.1\n", False, r"plastic strains of hardening_curve must"),
         (STEEL + "*PLASTIC\n3., 0., 20.\n4., 0., 70.\n", False, r"that depends on the temperature is not"),
@@ -159,7 +159,7 @@ def test_21_stiffnesses_are_in_their_places(tmp_path: Path) -> None:
         (
             "*ELASTIC, TYPE=ORTHO\n1., 0., 1., 0., 0., 1., 1., 1.,\n1.\n",
             True,
-            r"TYPE=ORTHO with NLGEOM has no",
+            r"TYPE=ORTHO with NLGEOM is not",
         ),
     ],
 )

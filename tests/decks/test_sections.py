@@ -51,7 +51,7 @@ def test_a_pressure_and_a_weight_act_on_the_thickness_behind_them(tmp_path: Path
 def test_several_thicknesses_of_metal_that_yields_are_refused(tmp_path: Path) -> None:
     text = PLATE.replace("0.\n*ELSET", "0.\n*PLASTIC\n300., 0.\n*ELSET").replace("CPS4", "CPE4")
     text += TWO + HELD
-    with pytest.raises(DeckError, match=r"plane bodies of several thicknesses with PLASTIC have no"):
+    with pytest.raises(DeckError, match=r"plane bodies of several thicknesses with PLASTIC are not"):
         read_deck(deck(tmp_path, text + step("")))
 
 

@@ -85,7 +85,7 @@ HOT = step("*TEMPERATURE\nALL, 220.\n")
         (heated(SOFTENING + "*PLASTIC\n300., 0.\n", HOT), r"must not depend on the temperature"),
         (
             heated(SOFTENING, HOT).replace("ALL, 120.\n", "ALL, 120.\nBAR_X0, 20.\n"),
-            r"depend on the temperature with several initial temperatures have no counterpart",
+            r"depend on the temperature are not supported with several initial temperatures",
         ),
         (heated(SOFTENING.replace("520.", "20."), HOT), r"pairs of a temperature and a value with ascending"),
     ],
