@@ -39,6 +39,7 @@ FLOORS = [
         Room("materials", "elastic, rubber, metal", "model"),
         Room("mesh", "cells, faces, subdomains", "model"),
     ],
+    [Room("_kinematics", "in space, in the plane, around an axis, with torsion; finite elements", "model")],
     [
         Room("_surfaces", "facets, true surfaces", "model"),
         Room("readers", "gmsh, CAD, dolfinx, meshio", "model"),

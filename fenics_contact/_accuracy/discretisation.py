@@ -4,28 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 import ufl
-from ufl.algorithms import expand_derivatives
+from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._accuracy.recovery import find_sites, recovered_gradients
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import Composition, on_cells
+from fenics_contact._fem.composition import Composition
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.model_checks import stiffness_of_cell
 from fenics_contact._fem.templates import (
     Template,
     Written,
-    per_revolution,
     scalar_constants,
     volume_measure,
 )
+from fenics_contact._kinematics.element import Element
+from fenics_contact._kinematics.integration import FULL
 from fenics_contact._scene.body import Body
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_mean
@@ -37,7 +38,7 @@ from fenics_contact.mesh.collapsed import as_hexahedra, places_of
 from fenics_contact.mesh.quality import determinants
 
 
-def moduli(forms: FormLibrary, material: Material, cell_type: str) -> np.ndarray:
+def moduli(forms: FormLibrary, material: Material, element: Element) -> np.ndarray:
     """Return C of C g : g, twice the energy per volume of a displacement gradient g.
 
     A material only defines a bilinear form of displacements, and its stress may be any UFL. On a cell with
@@ -46,13 +47,13 @@ def moduli(forms: FormLibrary, material: Material, cell_type: str) -> np.ndarray
 
     The result has shape (dim², dim²), g_kj at index dim k + j, [force / length²].
     """
-    parts, cell = Composition((material,)), CELL_TYPES[_dolfinx.of_mesh(cell_type)]
+    parts, cell = Composition((material,)), element.cell
 
     def bind(space: _dolfinx.fem.FunctionSpace) -> _dolfinx.fem.Form:
-        return forms.stiffness(parts, cell_type, space)
+        return forms.stiffness(parts, element, space)
 
     def on_cell_of(size: float) -> np.ndarray:
-        K, points = stiffness_of_cell(size * cell.nodes, cell_type, bind)
+        K, points = stiffness_of_cell(size * cell.nodes, element, bind)
         n, dim = points.shape
         motions = np.einsum("ki,nj->nikj", np.eye(dim), points).reshape(n * dim, dim * dim)
         return np.asarray(motions.T @ K @ motions / (cell.reference_volume * size**dim))
@@ -71,7 +72,7 @@ def energy_of_difference(
 
     The result has shape (n,), [force · length].
     """
-    cell = CELL_TYPES[_dolfinx.of_mesh(cell_type)]
+    cell = CELL_TYPES[cell_type]
     integrate = _over_simplices if cell.is_affine else _by_quadrature
     return integrate(moduli, cell, points, displacement, gradient)
 
@@ -138,41 +139,28 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 DEGREE = 2
 
 
-def compile_energy(forms: FormLibrary, material: Material, cell_type: str) -> Template:
+def compile_energy(forms: FormLibrary, material: Material, element: Element) -> Template:
     """Compile the energy of a material unless that was done. Collective."""
-    key = ("energy of a difference", material, cell_type)
-    name = ("energy of a difference", type(material), cell_type)
-    return forms.templates.get(key, name, partial(_write, material, cell_type))
+    key = ("energy of a difference", material, element)
+    name = ("energy of a difference", type(material), element.name)
+    return forms.templates.get(key, name, partial(_write, material, element))
 
 
-def _write(material: Material, cell_type: str) -> Written:
-    """Return ∫ C (g − ∇u) : (g − ∇u) over each cell, with the rows of g and u as coefficients.
-
-    A material is defined for displacements only. Its energy is written for c·x − d with constants c and d,
-    whose gradient is c; then c is replaced by g − ∇u, and d by (g − ∇u)·x, so that the displacement is zero:
-    materials may resist displacements, too.
-    """
-    dim = _dolfinx.dimension(cell_type)
-    u, *rows = _dolfinx.field_symbols(cell_type, _dolfinx.components(cell_type) + 1)
-    q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
-    parameters = scalar_constants(cell_type, len(material.parameters))
+def _write(material: Material, element: Element) -> Written:
+    """Return ∫ C (g − ∇u) : (g − ∇u) over each cell, with the rows of g and u as coefficients."""
+    dim = element.dim
+    u, *rows = element.fields(element.components + 1)
+    q = ufl.TestFunction(element.cellwise())
+    parameters = scalar_constants(element, len(material.parameters))
     difference = ufl.as_tensor([[row[j] for j in range(dim)] for row in rows]) - ufl.grad(u)
     # At the points of reduced integration the gradient is better than elsewhere.
-    more = _dolfinx.degree(cell_type) if _dolfinx.is_reduced(cell_type) else 1
-    measure = volume_measure(cell_type, DEGREE * more)
-    if _dolfinx.is_revolved(cell_type):
-        from fenics_contact._fem.revolution import strained  # plane and solid bodies go without
+    measure = volume_measure(replace(element, integration=FULL), DEGREE)
 
-        # The hoop strain u_r / r and the turn u_θ / r are as accurate as the recovered gradient.
-        trial = strained(difference, 0.0)
-        density = on_cells(material.stiffness(trial, trial, parameters), cell_type)
-        return per_revolution(density * q, cell_type) * measure, parameters, (u, *rows)
-    x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
-    c, d = (_dolfinx.constant_symbol(cell_type, shape) for shape in ((dim, dim), (dim,)))
-    trial = ufl.dot(c, x) - d
-    density = expand_derivatives(material.stiffness(trial, trial, parameters))
-    density = ufl.replace(density, {c: difference, d: ufl.dot(difference, x)})
-    return density * q * measure, parameters, (u, *rows)
+    def energy(trial: Expr) -> Expr:
+        return material.stiffness(trial, trial, parameters)
+
+    density = element.kinematics.of_gradient(energy, difference, element)
+    return element.integrand(density * q) * measure, parameters, (u, *rows)
 
 
 def energy_on_subdomain(
@@ -373,12 +361,12 @@ class CellEnergies:
     """Energies of differences of gradients in one body. Collective."""
 
     def __init__(self, torn: TornSystem, body: Body) -> None:
-        forms, cell_type = torn.decomposition.forms, body.cell_type
+        forms, element = torn.decomposition.forms, body.element
         self._body = body
         self._ways: list[np.ndarray | Template] = [
-            compile_energy(forms, material, cell_type)
-            if forms.varies(material, cell_type)
-            else moduli(forms, material, cell_type)
+            compile_energy(forms, material, element)
+            if forms.varies(material, element)
+            else moduli(forms, material, element)
             for material in body.materials
         ]
 

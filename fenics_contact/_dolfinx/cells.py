@@ -1,9 +1,4 @@
-"""Cell types: dimension, shape, degree, order of nodes, facets.
-
-Forms of bodies of revolution are written on cells whose type has the word axisymmetric in front: they have
-weights and strains of their own. Where such bodies may twist, the word torsion follows: displacements have a
-third component, around the axis. The word reduced behind the type stands for integrals by fewer points.
-"""
+"""Cell types: dimension, shape, degree, order of nodes, facets."""
 
 from __future__ import annotations
 
@@ -43,72 +38,14 @@ _FACET_VERTICES = {
 }
 
 
-#: What the types of cells of bodies of revolution begin with.
-_REVOLVED = "axisymmetric "
-#: What follows where such bodies may twist.
-_TWISTING = "torsion "
-#: What the types of quadratic cells end with that are integrated by the points of linear ones.
-_REDUCED = " reduced"
-_RESISTING = " resisting"
-
-
-def revolved(cell_type: str, torsion: bool = False) -> str:
-    """Return the type of plane cells as that of a body of revolution, which may twist."""
-    return _REVOLVED + (_TWISTING if torsion else "") + cell_type
-
-
-def reduced(cell_type: str, resisting: bool = False) -> str:
-    """Return the type of quadratic cells as that of cells integrated by the points of linear ones.
-
-    `resisting`: whether none of their motions goes without energy.
-    """
-    return cell_type + (_RESISTING if resisting else "") + _REDUCED
-
-
-def is_reduced(cell_type: str) -> bool:
-    """Return whether quadratic cells are integrated by the points of linear ones."""
-    return cell_type.endswith(_REDUCED)
-
-
-def is_resisting(cell_type: str) -> bool:
-    """Return whether motions without energy of reduced cells are given some."""
-    return _RESISTING in cell_type
-
-
-def is_revolved(cell_type: str) -> bool:
-    """Return whether cells are those of a body of revolution."""
-    return cell_type.startswith(_REVOLVED)
-
-
-def has_torsion(cell_type: str) -> bool:
-    """Return whether cells are those of a body of revolution that may twist."""
-    return cell_type.startswith(_REVOLVED + _TWISTING)
-
-
-def components(cell_type: str) -> int:
-    """Return the number of components of displacements on such cells."""
-    return 3 if has_torsion(cell_type) else dimension(cell_type)
-
-
-def of_mesh(cell_type: str) -> str:
-    """Return the type that the cells have in a mesh, which does not know what a body makes of them."""
-    return (
-        cell_type.removeprefix(_REVOLVED)
-        .removeprefix(_TWISTING)
-        .removesuffix(_REDUCED)
-        .removesuffix(_RESISTING)
-    )
-
-
 def shape(cell_type: str) -> str:
     """Return dolfinx's name of the shape of such cells."""
-    cell = of_mesh(cell_type)
-    return _SHAPE.get(cell, cell)
+    return _SHAPE.get(cell_type, cell_type)
 
 
 def degree(cell_type: str) -> int:
     """Return the degree of the map from the reference cell and of displacements, 1 or 2."""
-    return 2 if of_mesh(cell_type) in _SHAPE else 1
+    return 2 if cell_type in _SHAPE else 1
 
 
 def cell_type_named(name: str, order: int) -> str:

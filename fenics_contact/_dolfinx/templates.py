@@ -7,7 +7,7 @@ from itertools import count
 
 import ufl
 
-from fenics_contact._dolfinx.cells import components, degree, dimension
+from fenics_contact._dolfinx.cells import degree, dimension
 from fenics_contact._dolfinx.cells import shape as shape_of
 from fenics_contact._dolfinx.loading import old
 
@@ -57,18 +57,18 @@ def template(cell_type: str) -> ufl.Mesh:
 
 
 @lru_cache(maxsize=16)
-def displacement_space(cell_type: str) -> ufl.FunctionSpace:
-    """Return the template's space of displacements, of the cells' degree."""
-    return ufl.FunctionSpace(template(cell_type), vector_element(cell_type, components(cell_type)))
+def displacement_space(cell_type: str, size: int = 0) -> ufl.FunctionSpace:
+    """Return the template's space of displacements, of the cells' degree, by default one per direction."""
+    return ufl.FunctionSpace(template(cell_type), vector_element(cell_type, size))
 
 
-def field_symbols(cell_type: str, count: int) -> list[ufl.Coefficient]:
+def field_symbols(cell_type: str, count: int, size: int = 0) -> list[ufl.Coefficient]:
     """Return UFL coefficients on the template's `displacement_space`, to be bound to Functions later.
 
     They are numbered from 0 in every form: ffcx 0.5 writes counts into C identifiers, which fails from ten
     on.
     """
-    return [ufl.Coefficient(displacement_space(cell_type), count=number) for number in range(count)]
+    return [ufl.Coefficient(displacement_space(cell_type, size), count=number) for number in range(count)]
 
 
 def constant_symbol(cell_type: str, shape: tuple[int, ...] = ()) -> ufl.Constant:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from fenics_contact import _dolfinx
-from fenics_contact._fem.templates import Constants, per_revolution, scalar_constants
+from fenics_contact._fem.templates import Constants, scalar_constants
+from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.body import Body
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
@@ -61,36 +60,18 @@ def material_sets(body: Body) -> tuple[tuple[Material, ...], ...]:
     return single if len(single) == 1 else (*single, body.materials)
 
 
-def as_in_space(cell_type: str, *fields: Any) -> tuple[Any, ...]:
-    """Return displacements as materials get them, of bodies of revolution in space; see `_fem.revolution`."""
-    if not _dolfinx.is_revolved(cell_type):
-        return fields
-    from fenics_contact._fem.revolution import stand_ins  # plane and solid bodies go without
-
-    return stand_ins(cell_type, fields)
-
-
-def on_cells(density: Expr, cell_type: str) -> Expr:
-    """Return what a material made of `as_in_space`, written in displacements on the cells."""
-    if not _dolfinx.is_revolved(cell_type):
-        return density
-    from fenics_contact._fem.revolution import in_plane
-
-    return in_plane(density, cell_type)
-
-
 def integrate(
-    materials: tuple[Material, ...], cell_type: str, integrand: OfMaterial, measure: ufl.Measure
+    materials: tuple[Material, ...], element: Element, integrand: OfMaterial, measure: ufl.Measure
 ) -> tuple[ufl.Form, Constants]:
     """Return ∫ integrand over all materials (a form) and its constants."""
     all_constants: list[ufl.Constant] = []
     form = None
     for number, material in enumerate(materials):
-        constants = scalar_constants(cell_type, len(material.parameters))
+        constants = scalar_constants(element, len(material.parameters))
         with user_code(f"the UFL of material {type(material).__name__}"):
             density = integrand(material, constants)
             if density is not None:
-                density = per_revolution(on_cells(density, cell_type), cell_type)
+                density = element.integrand(element.on_cells(density))
         all_constants.extend(constants)
         if density is not None:
             part = density * (measure if len(materials) == 1 else measure(number + 1))

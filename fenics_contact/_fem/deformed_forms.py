@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import ufl
 from ufl.core.expr import Expr
 
-from fenics_contact import _dolfinx
-from fenics_contact._fem.composition import as_in_space, integrate
+from fenics_contact._fem.composition import integrate
 from fenics_contact._fem.heated import as_stretched, heat_expands, on_stretched
 from fenics_contact._fem.templates import (
     UNSEEN,
@@ -21,6 +20,7 @@ from fenics_contact._fem.templates import (
     polynomial,
     volume_measure,
 )
+from fenics_contact._kinematics.element import Element
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import (
     deformation_gradient,
@@ -57,11 +57,11 @@ class Fields(NamedTuple):
 Density = Callable[[Any, Fields, Constants], "Expr | None"]
 
 
-def prepare_forms(templates: Templates, materials: tuple[Material, ...], cell_type: str) -> None:
+def prepare_forms(templates: Templates, materials: tuple[Material, ...], element: Element) -> None:
     """Compile the missing forms of a set of materials, one of them nonlinear. Collective."""
     for kind in FORMS | (MEAN_FORMS if have_mean_energy(materials) else {}):
-        name = (kind, *(type(material) for material in materials), cell_type)
-        templates.get((kind, materials, cell_type), name, partial(_written, kind, materials, cell_type))
+        name = (kind, *(type(material) for material in materials), element.name)
+        templates.get((kind, materials, element), name, partial(_written, kind, materials, element))
 
 
 def have_mean_energy(materials: tuple[Material, ...]) -> bool:
@@ -69,21 +69,21 @@ def have_mean_energy(materials: tuple[Material, ...]) -> bool:
     return any(has_mean_dilatation(each) and not isinstance(each, HistoryMaterial) for each in materials)
 
 
-def _written(kind: str, materials: tuple[Material, ...], cell_type: str) -> Written:
+def _written(kind: str, materials: tuple[Material, ...], element: Element) -> Written:
     """Return a form; its coefficients are the displacement and the fields of `MeanDilatation`.
 
     Where a nonlinear material expands the change of temperature is the last of them.
     """
-    (u,) = _dolfinx.field_symbols(cell_type, 1)
-    space = _dolfinx.cellwise_space(cell_type, coefficient_shape(cell_type))
+    (u,) = element.fields(1)
+    space = element.cellwise(coefficient_shape(element))
     means, pressures = (ufl.Coefficient(space, count=number) for number in (1, 2))
-    centre = ufl.Coefficient(_dolfinx.cellwise_space(cell_type, (len(u),)), count=3)
-    q, r = (polynomial(each(space), centre, cell_type) for each in (ufl.TestFunction, ufl.TrialFunction))
-    dilatation, pressure = (polynomial(each, centre, cell_type) for each in (means, pressures))
+    centre = ufl.Coefficient(element.cellwise((len(u),)), count=3)
+    q, r = (polynomial(each(space), centre, element) for each in (ufl.TestFunction, ufl.TrialFunction))
+    dilatation, pressure = (polynomial(each, centre, element) for each in (means, pressures))
     V = u.ufl_function_space()
-    moved, v, du = as_in_space(cell_type, u, ufl.TestFunction(V), ufl.TrialFunction(V))
-    fields = Fields(moved, v, du, dilatation, pressure, (q, r), cell_type in UNSEEN)
-    change = ufl.Coefficient(_dolfinx.nodal_space(cell_type), count=4)
+    moved, v, du = element.in_space(u, ufl.TestFunction(V), ufl.TrialFunction(V))
+    fields = Fields(moved, v, du, dilatation, pressure, (q, r), element.cells in UNSEEN)
+    change = ufl.Coefficient(element.nodal, count=4)
     density = (FORMS | MEAN_FORMS)[kind]
 
     def integrand(material: Material, constants: Constants) -> Expr | None:
@@ -100,9 +100,9 @@ def _written(kind: str, materials: tuple[Material, ...], cell_type: str) -> Writ
         part = density(material, heated, constants)
         # What is integrated over cells grows as the volume of a warm body does; these two are per volume.
         power = {"cell pressure": 0, "bulk modulus": -3}.get(kind, 3)
-        return None if part is None else stretch**power * on_stretched(part, cell_type)
+        return None if part is None else stretch**power * on_stretched(part, element)
 
-    form, constants = integrate(materials, cell_type, integrand, volume_measure(cell_type))
+    form, constants = integrate(materials, element, integrand, volume_measure(element))
     coefficients = (u, means, pressures, centre)
     return form, constants, (*coefficients, change) if any(map(heat_expands, materials)) else coefficients
 

@@ -13,7 +13,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import Composition, as_in_space, integrate, material_sets
+from fenics_contact._fem.composition import Composition, integrate, material_sets
 from fenics_contact._fem.heated import as_stretched, on_stretched
 from fenics_contact._fem.load_forms import (
     FIRST_COUNT,
@@ -34,10 +34,11 @@ from fenics_contact._fem.templates import (
     Template,
     Templates,
     Written,
-    resisting,
     scalar_constants,
+    stiffness_form,
     volume_measure,
 )
+from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.fields import Ufl, evaluate
 from fenics_contact._scene.loads import InitialStress, Load, PointForce, Pressure, ThermalStrain
 from fenics_contact._scene.scene import Scene
@@ -58,8 +59,8 @@ class FormLibrary:
     def __init__(self, comm: MPI.Comm) -> None:
         """Start empty; `prepare` fills it."""
         self._comm, self._templates = comm, Templates(comm)
-        self._typical_modulus: dict[tuple[Material, str], float] = {}
-        self._deformable: set[tuple[Material, str]] = set()
+        self._typical_modulus: dict[tuple[Material, Element], float] = {}
+        self._deformable: set[tuple[Material, Element]] = set()
 
     @property
     def compiled(self) -> tuple[tuple[object, ...], ...]:
@@ -74,33 +75,33 @@ class FormLibrary:
     def prepare(self, scene: Scene) -> None:
         """Compile the missing forms of a scene. Collective on the library's communicator."""
         for body in scene.bodies.values():
-            cell_type = body.cell_type
+            element = body.element
             for materials in material_sets(body):
-                self._prepare_stiffness(materials, cell_type)
+                self._prepare_stiffness(materials, element)
         with together(self._comm):
             for body in scene.bodies.values():
                 for material in body.materials:
-                    self._check(material, body.cell_type)
+                    self._check(material, body.element)
         for load in as_tractions(scene):
             if isinstance(load, PointForce):
                 continue
             body = scene.bodies[load.body]
             for materials in material_sets(body):
                 if has_work(load, materials):
-                    self._prepare_load(load, materials, body.cell_type)
+                    self._prepare_load(load, materials, body.element)
 
     def stiffness(
-        self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace
+        self, parts: Composition, element: Element, space: _dolfinx.fem.FunctionSpace
     ) -> _dolfinx.fem.Form:
         """Return the bilinear form of the materials ``parts`` bound to ``space``."""
-        template = self._templates["stiffness", parts.materials, cell_type]
+        template = self._templates["stiffness", parts.materials, element]
         return template.bind([space, space], parts.parameters, cells=parts.cells)
 
     def load(
         self,
         load: Load,
         parts: Composition,
-        cell_type: str,
+        element: Element,
         space: _dolfinx.fem.FunctionSpace,
         points: np.ndarray,
         facets: tuple[np.ndarray, np.ndarray] | None = None,
@@ -114,7 +115,7 @@ class FormLibrary:
         facets) on which a surface load acts; `acted`: marks of the nodes of its surface by input node, shape
         (n,); `cells`: from `loaded_cells`; `of_cells`: an initial stress on the cells, (n_cells, 6).
         """
-        template = self._templates[load_key(load, parts.materials, cell_type)]
+        template = self._templates[load_key(load, parts.materials, element)]
         functions = load_fields(load, space, points, acted, of_cells)
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
@@ -122,23 +123,23 @@ class FormLibrary:
         """Compile the missing forms of nonlinear materials and following pressures of a scene. Collective."""
         from fenics_contact._fem.loads import prepare_following  # linear scenes go without
         from fenics_contact._fem.mechanics import prepare_mechanics
-        from fenics_contact._fem.model_checks import check_hyperelastic
+        from fenics_contact._fem.model_checks import check_deformed
 
         prepare_mechanics(self._templates, scene)
         prepare_following(self._templates, scene)
         with together(self._comm):
             for body in scene.bodies.values():
                 for material in body.materials:
-                    cell_type = body.cell_type
+                    element = body.element
                     if (
                         isinstance(material, Hyperelasticity)
-                        and (material, cell_type) not in self._deformable
+                        and (material, element) not in self._deformable
                     ):
-                        check_hyperelastic(material, cell_type, self._templates)
-                        self._deformable.add((material, cell_type))
+                        check_deformed(material, element, self._templates)
+                        self._deformable.add((material, element))
 
     def mechanics(
-        self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
+        self, parts: Composition, element: Element, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
     ) -> Mechanics:
         """Return forces and tangent of the materials ``parts`` on one mesh of a scene with nonlinear ones.
 
@@ -146,24 +147,24 @@ class FormLibrary:
         """
         from fenics_contact._fem.mechanics import HyperelasticMechanics, LinearMechanics
 
-        if not any(self.varies(material, cell_type) for material in parts.materials):
+        if not any(self.varies(material, element) for material in parts.materials):
             points = points - points[0]  # as exact far from the origin as near it
         if not any(map(is_nonlinear, parts.materials)):
-            return LinearMechanics(self.stiffness(parts, cell_type, space), space.mesh, points)
+            return LinearMechanics(self.stiffness(parts, element, space), space.mesh, points)
         remembering = [isinstance(material, HistoryMaterial) for material in parts.materials]
         others = None
         if not all(remembering):
-            others = HyperelasticMechanics(self._templates, parts, cell_type, space, points)
+            others = HyperelasticMechanics(self._templates, parts, element, space, points)
         if others is not None and not any(remembering):
             return others
         from fenics_contact._fem.mechanics import HistoryMechanics
 
-        return HistoryMechanics(parts, cell_type, space, points, others)
+        return HistoryMechanics(parts, element, space, points, others)
 
     def following(
         self,
         load: Pressure,
-        cell_type: str,
+        element: Element,
         space: _dolfinx.fem.FunctionSpace,
         points: np.ndarray,
         facets: tuple[np.ndarray, np.ndarray],
@@ -172,45 +173,45 @@ class FormLibrary:
         """Return what a pressure that follows its surface adds on one mesh; arguments as for `load`."""
         from fenics_contact._fem.loads import FollowingPressure
 
-        return FollowingPressure(self._templates, load, cell_type, space, points, facets, acted)
+        return FollowingPressure(self._templates, load, element, space, points, facets, acted)
 
-    def varies(self, material: Material, cell_type: str) -> bool:
+    def varies(self, material: Material, element: Element) -> bool:
         """Return whether the stiffness of a material depends on position."""
-        return self._templates["stiffness", (material,), cell_type].mentions(ufl.geometry.SpatialCoordinate)
+        return self._templates["stiffness", (material,), element].mentions(ufl.geometry.SpatialCoordinate)
 
-    def typical_modulus(self, material: Material, cell_type: str) -> float:
+    def typical_modulus(self, material: Material, element: Element) -> float:
         """Return the mean diagonal entry of the stiffness of a cell of edge length one.
 
         [force / length²] times [length^(dim − 2)]; a measure of the relative stiffness of materials.
         """
-        return self._typical_modulus[material, cell_type]
+        return self._typical_modulus[material, element]
 
-    def _check(self, material: Material, cell_type: str) -> None:
-        if (material, cell_type) not in self._typical_modulus:
-            template = self._templates["stiffness", (material,), cell_type]
-            model = _Model(material, cell_type, template.signature, template)
-            self._typical_modulus[material, cell_type] = _checked_modulus(model)
+    def _check(self, material: Material, element: Element) -> None:
+        if (material, element) not in self._typical_modulus:
+            template = self._templates["stiffness", (material,), element]
+            model = _Model(material, element, template.signature, template)
+            self._typical_modulus[material, element] = _checked_modulus(model)
 
-    def _prepare_stiffness(self, materials: tuple[Material, ...], cell_type: str) -> None:
+    def _prepare_stiffness(self, materials: tuple[Material, ...], element: Element) -> None:
         def write() -> Written:
-            V = _dolfinx.displacement_space(cell_type)
-            u, v = as_in_space(cell_type, ufl.TrialFunction(V), ufl.TestFunction(V))
+            V = element.displacements
+            u, v = element.in_space(ufl.TrialFunction(V), ufl.TestFunction(V))
             form, constants = integrate(
-                materials, cell_type, lambda m, c: m.stiffness(u, v, c), volume_measure(cell_type)
+                materials, element, lambda m, c: m.stiffness(u, v, c), volume_measure(element)
             )
-            return resisting(form, cell_type), constants, ()
+            return stiffness_form(form, element), constants, ()
 
-        name = ("stiffness", *(type(material) for material in materials), cell_type)
-        self._templates.get(("stiffness", materials, cell_type), name, write)
+        name = ("stiffness", *(type(material) for material in materials), element.name)
+        self._templates.get(("stiffness", materials, element), name, write)
 
-    def _prepare_load(self, load: Load, materials: tuple[Material, ...], cell_type: str) -> None:
+    def _prepare_load(self, load: Load, materials: tuple[Material, ...], element: Element) -> None:
         def write() -> Written:
-            v = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
-            symbol = Symbol(load, cell_type)
-            form, constants = load_work(load, materials, cell_type, symbol.expression, v)
+            v = ufl.TestFunction(element.displacements)
+            symbol = Symbol(load, element)
+            form, constants = load_work(load, materials, element, symbol.expression, v)
             return form, (*symbol.constants, *constants), symbol.coefficients
 
-        self._templates.get(load_key(load, materials, cell_type), load_name(load, cell_type), write)
+        self._templates.get(load_key(load, materials, element), load_name(load, element), write)
 
 
 @dataclass(frozen=True)
@@ -218,7 +219,7 @@ class _Model:
     """A material on cells of one type, by what its form is made of."""
 
     material: Material
-    cell_type: str
+    element: Element
     signature: str
     template: Template = field(compare=False)
 
@@ -230,8 +231,8 @@ def _checked_modulus(model: _Model) -> float:
     def bind(space: _dolfinx.fem.FunctionSpace) -> _dolfinx.fem.Form:
         return model.template.bind([space, space], model.material.parameters)
 
-    check_model(model.material, model.cell_type, bind)
-    return float(np.diag(unit_cell_stiffness(model.cell_type, bind)).mean())
+    check_model(model.material, model.element, bind)
+    return float(np.diag(unit_cell_stiffness(model.element, bind)).mean())
 
 
 def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
@@ -246,11 +247,10 @@ def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
         mesh = body.mesh
         volume = cell_volumes(mesh.points, mesh.cells) if mesh.hanging else mesh.volume / mesh.n_cells
         size = volume ** (1.0 / scene.dim)
-        cell_type = body.cell_type
-        moduli = np.array([forms.typical_modulus(material, cell_type) for material in body.materials])
+        element = body.element
+        moduli = np.array([forms.typical_modulus(material, element) for material in body.materials])
         stiffness[name] = moduli[body.material_of_cells] * size ** (scene.dim - 2)
-        if body.axisymmetric:
-            stiffness[name] *= mesh.points[mesh.cells, 0].mean(axis=1)
+        stiffness[name] *= body.kinematics.typical_size(mesh.points[mesh.cells])
     return stiffness
 
 
@@ -277,18 +277,18 @@ class Temperature:
         """Values of the constants: the sum of the uniform changes."""
         return (sum(self._numbers),) if self._numbers else ()
 
-    def write(self, cell_type: str) -> tuple[AtRest, Constants, tuple[ufl.Coefficient, ...]]:
+    def write(self, element: Element) -> tuple[AtRest, Constants, tuple[ufl.Coefficient, ...]]:
         """Return ΔT and initial stress (UFL), their constants and their coefficients."""
-        constants = scalar_constants(cell_type, 1) if self._numbers else ()
+        constants = scalar_constants(element, 1) if self._numbers else ()
         coefficients: tuple[ufl.Coefficient, ...] = ()
         if self.of_position:
-            coefficients = (ufl.Coefficient(_dolfinx.nodal_space(cell_type), count=FIRST_COUNT),)
-        terms = [*constants, *coefficients, *(from_ufl(load, load.value, cell_type) for load in self._ufl)]
+            coefficients = (ufl.Coefficient(element.nodal, count=FIRST_COUNT),)
+        terms = [*constants, *coefficients, *(from_ufl(load, load.value, element) for load in self._ufl)]
         change = sum(terms[1:], terms[0]) if terms else None
         if not self.initial:
-            return AtRest(change, None, cell_type), constants, coefficients
-        stress = ufl.Coefficient(_dolfinx.cellwise_space(cell_type, (6,)), count=FIRST_COUNT + 1)
-        return AtRest(change, as_stress(stress), cell_type), constants, (*coefficients, stress)
+            return AtRest(change, None, element), constants, coefficients
+        stress = ufl.Coefficient(element.cellwise((6,)), count=FIRST_COUNT + 1)
+        return AtRest(change, as_stress(stress), element), constants, (*coefficients, stress)
 
     def fields(
         self, mesh: _dolfinx.mesh.Mesh, points: np.ndarray, stress: np.ndarray | None = None
@@ -341,12 +341,12 @@ class AtRest:
     Attributes:
         temperature: ΔT (UFL), None without one.
         stress: Initial stress, 3 x 3 (UFL), None without one.
-        cell_type: That of the body's cells.
+        element: That of the body.
     """
 
     temperature: Expr | None
     stress: Expr | None
-    cell_type: str
+    element: Element
 
 
 def stress_left(material: Any, u: Expr, constants: Constants, at: AtRest) -> Expr:
@@ -372,7 +372,7 @@ def stress_in_space(material: Material, u: Expr, constants: Constants, at: AtRes
         if at.temperature is None or not material.expands:
             return material.cauchy(u, constants)
         (moved,) = as_stretched(1 + constants[-1] * at.temperature, u)
-        return on_stretched(material.cauchy(moved, constants), at.cell_type)
+        return on_stretched(material.cauchy(moved, constants), at.element)
     stress = stress_left(material, u, constants, at)
     if stress.ufl_shape == (3, 3):
         return stress

@@ -1,8 +1,8 @@
 """Bodies that expand by heat under large deformations: materials feel F / θ with a thermal stretch θ.
 
 Of a displacement u they get a stand-in whose gradient is (I + ∇u) / θ − I, in space also in the plane, of
-test functions one whose gradient is ∇v / θ; see `_fem.revolution`. An energy θ³ W(F / θ) then has the work
-θ³ ∂W : δF / θ.
+test functions one whose gradient is ∇v / θ; see `_kinematics.stand_ins`. An energy θ³ W(F / θ) then has
+the work θ³ ∂W : δF / θ.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.materials.plastic import HistoryMaterial
 
 if TYPE_CHECKING:
-    from fenics_contact._fem.revolution import StandIn
+    from fenics_contact._kinematics.element import Element
+    from fenics_contact._kinematics.stand_ins import StandIn
 
 
 def heat_expands(material: Any) -> bool:
@@ -27,7 +28,7 @@ def heat_expands(material: Any) -> bool:
 
 def as_stretched(stretch: Expr, displacement: Expr, *others: Expr) -> tuple[StandIn, ...]:
     """Return stand-ins for a displacement and for other fields, test functions among them."""
-    from fenics_contact._fem.revolution import stand_in  # others go without
+    from fenics_contact._kinematics.stand_ins import stand_in  # others go without
 
     gradient = (ufl.Identity(3) + _in_space(displacement)) / stretch - ufl.Identity(3)
     gradients = [gradient, *(_in_space(each) / stretch for each in others)]
@@ -35,18 +36,18 @@ def as_stretched(stretch: Expr, displacement: Expr, *others: Expr) -> tuple[Stan
     return tuple(stand_in(number, nowhere, each) for number, each in enumerate(gradients))
 
 
-def on_stretched(density: Expr, cell_type: str) -> Expr:
+def on_stretched(density: Expr, element: Element) -> Expr:
     """Return what a material made of stand-ins, in displacements on the cells."""
-    from fenics_contact._fem.revolution import in_plane
+    from fenics_contact._kinematics.stand_ins import replaced
 
-    return in_plane(density, cell_type)
+    return replaced(density, element.x)
 
 
 def _in_space(field: Expr) -> Expr:
     """Return the gradient of a field, 3 x 3."""
     gradient = getattr(field, "gradient", None)
     if gradient is not None:
-        return gradient  # of a body of revolution
+        return gradient  # of a stand-in
     G = ufl.grad(field)
     if G.ufl_shape == (3, 3):
         return G

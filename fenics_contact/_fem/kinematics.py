@@ -17,30 +17,30 @@ from fenics_contact._fem.templates import (
     coefficient_shape,
     quadrature_degree,
 )
+from fenics_contact._kinematics.element import Element
+from fenics_contact._kinematics.gradients import Gradients
 from fenics_contact.materials.hyperelastic import has_mean_dilatation
-from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_gradients, shape_values
-from fenics_contact.mesh.quality import determinants, jacobians
+from fenics_contact.mesh.cell_types import quadrature, shape_gradients, shape_values
+from fenics_contact.mesh.quality import determinants
 
 
 class Dilatation:
     """det F at the Gauss points of one mesh."""
 
-    def __init__(self, space: _dolfinx.fem.FunctionSpace, cell_type: str, points: np.ndarray) -> None:
+    def __init__(self, space: _dolfinx.fem.FunctionSpace, element: Element, points: np.ndarray) -> None:
         """Evaluate the Jacobians of the undeformed cells.
 
         `points`: coordinates by block, shape (n, dim), [length].
         """
-        cell = CELL_TYPES[_dolfinx.of_mesh(cell_type)]
-        self._positions, _ = quadrature(cell, quadrature_degree(cell_type))
+        self._positions, _ = quadrature(element.cell, quadrature_degree(element))
         self._points, self._cells = points, _dolfinx.vtk_cell_dofs(space)
-        self._values = shape_values(cell, self._positions) if _dolfinx.is_revolved(cell_type) else None
+        self._element = element
         self._undeformed = self._volumes(points)
-        self._cell_type = cell_type
 
     @cached_property
     def polynomials(self) -> CellPolynomials:
         """The polynomials of the undeformed cells."""
-        return CellPolynomials(self._points, self._cells, self._cell_type)
+        return CellPolynomials(self._points, self._cells, self._element)
 
     def least(self, displacement: np.ndarray) -> float:
         """Return the smallest det F of all Gauss points.
@@ -55,9 +55,8 @@ class Dilatation:
         return np.asarray(self._volumes(moved) / self._undeformed)
 
     def _volumes(self, points: np.ndarray) -> np.ndarray:
-        """Return the Jacobians of cells, of bodies of revolution times the radius, (n_cells, n_gauss)."""
-        plane = jacobians(points, self._cells, self._positions)
-        return plane if self._values is None else plane * (points[self._cells, 0] @ self._values.T)
+        """Return the volumes of cells per reference volume, (n_cells, n_gauss)."""
+        return self._element.kinematics.volumes(points, self._cells, self._positions)
 
 
 #: Bulk modulus at rest of what is not projected, by the shear modulus, in cells of type `UNSEEN`.
@@ -86,20 +85,9 @@ class MeanStrain:
         media, International Journal for Numerical Methods in Engineering 15 (1980).
     """
 
-    def __init__(
-        self,
-        gradients: np.ndarray,
-        polynomials: CellPolynomials,
-        share: float = 0.0,
-        hoop: np.ndarray | None = None,
-    ) -> None:
-        """Project the divergence of each shape function.
-
-        `gradients`: of the shape functions, shape (n_cells, n_gauss, nodes, dim), [1 / length]; `hoop`: these
-        over the radius on bodies of revolution, shape (n_cells, n_gauss, nodes), [1 / length].
-        """
+    def __init__(self, gradients: Gradients, polynomials: CellPolynomials, share: float = 0.0) -> None:
+        """Project the divergence of each shape function."""
         self._gradients, self._polynomials, self._part = gradients, polynomials, 1.0 - share
-        self._hoop = hoop
 
     def averaged(self, tensors: np.ndarray) -> np.ndarray:
         """Return H̄ of H; of the stress on H̄ that which does the same work on H.
@@ -118,22 +106,14 @@ class MeanStrain:
 
         `tangent`: A, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
         """
-        G, dim = self._gradients, self._gradients.shape[-1]
-        flat = (*G.shape[:2], -1)
-        divergence = G
-        if self._hoop is not None:
-            divergence = G.copy()
-            divergence[..., 0] += self._hoop
+        divergence = self._gradients.divergence
+        flat = (*divergence.shape[:2], -1)
         apart = self._apart(divergence.reshape(flat))
         by_trace = np.einsum("cqijkk->cqij", tangent)
         from_trace = np.einsum("cqiikl->cqkl", tangent)
         both = np.einsum("cqii->cq", by_trace)
-        left = G @ by_trace[..., :dim, :dim].swapaxes(2, 3)
-        right = G @ from_trace[..., :dim, :dim].swapaxes(2, 3)
-        if self._hoop is not None:
-            left[..., 0] += by_trace[..., 2, 2, None] * self._hoop
-            right[..., 0] += from_trace[..., 2, 2, None] * self._hoop
-        left, right = left.reshape(flat), right.reshape(flat) + both[..., None] * apart
+        left, right = (self._gradients.contracted(each).reshape(flat) for each in (by_trace, from_trace))
+        right = right + both[..., None] * apart
         w = self._polynomials.weights[..., None]
         outer = (w * left).swapaxes(1, 2) @ apart
         return np.asarray(outer + (w * apart).swapaxes(1, 2) @ right)
@@ -142,43 +122,33 @@ class MeanStrain:
 class GaussPoints:
     """The Gauss points of one mesh: those of the package's forms on cells of this type."""
 
-    def __init__(self, space: _dolfinx.fem.FunctionSpace, cell_type: str, points: np.ndarray) -> None:
+    def __init__(self, space: _dolfinx.fem.FunctionSpace, element: Element, points: np.ndarray) -> None:
         """Evaluate the gradients of the shape functions.
 
         `points`: coordinates by block, shape (n, dim), [length].
         """
-        cell = CELL_TYPES[_dolfinx.of_mesh(cell_type)]
-        positions, weights = quadrature(cell, quadrature_degree(cell_type))
+        cell = element.cell
+        positions, weights = quadrature(cell, quadrature_degree(element))
         reference = shape_gradients(cell, positions)
         self._values = shape_values(cell, positions)
         self._shape, self._cells = points.shape, _dolfinx.vtk_cell_dofs(space)
-        self._points, self._cell_type = points, cell_type
+        self._points, self._element = points, element
         jacobian = np.einsum("cai,qaj->cqij", points[self._cells], reference)
-        self._gradients = reference @ np.linalg.inv(jacobian)
-        self._weights = weights * determinants(jacobian)
-        self._hoop: np.ndarray | None = None  # N / r
-        if _dolfinx.is_revolved(cell_type):
-            radii = points[self._cells, 0] @ self._values.T
-            self._weights = 2 * np.pi * radii * self._weights
-            self._hoop = self._values / radii[..., None]
+        kinematics, first = element.kinematics, points[self._cells, 0] @ self._values.T
+        self._weights = kinematics.around(first) * (weights * determinants(jacobian))
+        self._gradients = kinematics.gradients(reference @ np.linalg.inv(jacobian), self._values, first)
 
     @property
     def shape(self) -> tuple[int, int]:
         """Numbers of cells and of points in each."""
-        return self._gradients.shape[0], self._gradients.shape[1]
+        return self._weights.shape[0], self._weights.shape[1]
 
     def gradient(self, displacement: np.ndarray) -> np.ndarray:
         """Return ∂u_i/∂X_j in three dimensions, zero out of the plane, shape (n_cells, n_gauss, 3, 3).
 
         `displacement`: by dof, shape (dim n,), [length].
         """
-        dim = self._shape[1]
-        nodal = displacement.reshape(self._shape)[self._cells]
-        gradient = np.zeros((*self.shape, 3, 3))
-        gradient[..., :dim, :dim] = nodal.swapaxes(1, 2)[:, None] @ self._gradients
-        if self._hoop is not None:
-            gradient[..., 2, 2] = np.einsum("cqa,ca->cq", self._hoop, nodal[..., 0])
-        return gradient
+        return self._gradients.of(displacement.reshape(self._shape)[self._cells])
 
     def interpolated(self, nodal: np.ndarray) -> np.ndarray:
         """Return a scalar field at the points, (n_cells, n_gauss), of its values by block, (n,)."""
@@ -189,12 +159,7 @@ class GaussPoints:
 
         `stress`: P at their points, shape (n_cells, n_gauss, 3, 3), [force / length²].
         """
-        dim = self._shape[1]
-        weighted = self._weights[cells][..., None, None] * stress[..., :dim, :dim]
-        nodal = (self._gradients[cells] @ weighted.swapaxes(2, 3)).sum(axis=1)
-        if self._hoop is not None:
-            hoop = self._weights[cells] * stress[..., 2, 2]
-            nodal[..., 0] += np.einsum("cqa,cq->ca", self._hoop[cells], hoop)
+        nodal = self._gradients.part(cells).force(self._weights[cells], stress)
         return np.bincount(self._dofs[cells].ravel(), nodal.ravel(), minlength=int(np.prod(self._shape)))
 
     def mean_strain(self, cells: np.ndarray, moduli: np.ndarray) -> MeanStrain:
@@ -202,9 +167,8 @@ class GaussPoints:
 
         `moduli`: of the material at rest, by Voigt components, shape (6, 6), [force / length²].
         """
-        share = held_share(moduli) if self._cell_type in UNSEEN else 0.0
-        hoop = None if self._hoop is None else self._hoop[cells]
-        return MeanStrain(self._gradients[cells], self._polynomials.of(cells), share, hoop)
+        share = held_share(moduli) if self._element.cells in UNSEEN else 0.0
+        return MeanStrain(self._gradients.part(cells), self._polynomials.of(cells), share)
 
     def stiffness(
         self, tangent: np.ndarray, cells: np.ndarray, means: MeanStrain | None = None
@@ -213,34 +177,11 @@ class GaussPoints:
 
         `tangent`: A at their points, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
         """
-        dim, (_, m) = self._shape[1], self.shape
-        G, weights = self._gradients[cells], self._weights[cells]
-        A = weights[..., None, None, None, None] * tangent[..., :dim, :dim, :dim, :dim]
-        half = A.reshape(len(cells), m, dim**3, dim) @ G.swapaxes(2, 3)
-        half = half.reshape(len(cells), m, dim, dim, -1).swapaxes(2, 3).reshape(len(cells), m * dim, -1)
-        left = G.swapaxes(1, 2).reshape(len(cells), -1, m * dim)
-        blocks = (left @ half).reshape(len(cells), left.shape[1], dim, dim, left.shape[1]).swapaxes(3, 4)
-        if self._hoop is not None:
-            blocks = blocks + self._hoop_blocks(tangent, cells)
-        entries = blocks.ravel()
+        entries = self._gradients.part(cells).blocks(self._weights[cells], tangent).ravel()
         if means is not None:
             entries = entries + means.blocks(tangent).ravel()
         _, _, places = self._pattern
         return np.bincount(places[cells].ravel(), entries, minlength=self.entries)
-
-    def _hoop_blocks(self, tangent: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Return what hoop strains add to the blocks of cells, shape (n_cells, nodes, 2, nodes, 2)."""
-        assert self._hoop is not None
-        G, N, weights = self._gradients[cells], self._hoop[cells], self._weights[cells][..., None, None]
-        by_hoop = (weights * tangent[..., :2, :2, 2, 2]).swapaxes(2, 3)  # [j, i]
-        from_hoop = weights * tangent[..., 2, 2, :2, :2]
-        shape = (len(cells), N.shape[2], 2, N.shape[2], 2)
-        blocks = np.zeros(shape)
-        blocks[..., 0] += np.einsum("cqai,cqb->caib", G @ by_hoop, N)
-        blocks[:, :, 0] += np.einsum("cqa,cqbk->cabk", N, G @ from_hoop.swapaxes(2, 3))
-        both = self._weights[cells] * tangent[..., 2, 2, 2, 2]
-        blocks[:, :, 0, :, 0] += np.einsum("cqa,cq,cqb->cab", N, both, N)
-        return blocks
 
     def assembled(self, entries: np.ndarray, others: sp.csr_matrix | None = None) -> sp.csr_matrix:
         """Return the matrix with entries from `stiffness`; its pattern is the same whatever is zero in it."""
@@ -261,7 +202,7 @@ class GaussPoints:
     @cached_property
     def _polynomials(self) -> CellPolynomials:
         """Those on which changes of volume are projected."""
-        return CellPolynomials(self._points, self._cells, self._cell_type)
+        return CellPolynomials(self._points, self._cells, self._element)
 
     @cached_property
     def _dofs(self) -> np.ndarray:
@@ -284,9 +225,9 @@ def assembled(form: _dolfinx.fem.Form, shape: tuple[int, int]) -> sp.csr_matrix:
     return sp.csr_matrix((data, indices, indptr), shape=shape)
 
 
-def mean_fields(mesh: _dolfinx.mesh.Mesh, cell_type: str) -> list[_dolfinx.fem.Function]:
+def mean_fields(mesh: _dolfinx.mesh.Mesh, element: Element) -> list[_dolfinx.fem.Function]:
     """Return the fields of `MeanDilatation`: dilatations and pressures by coefficients, centres of cells."""
-    shape, dim = coefficient_shape(cell_type), mesh.geometry.dim
+    shape, dim = coefficient_shape(element), mesh.geometry.dim
     shapes = (shape, shape, (dim,))
     return [_dolfinx.fem.Function(_dolfinx.cellwise_space_on(mesh, each)) for each in shapes]
 
@@ -308,7 +249,7 @@ class MeanDilatation:
         self,
         templates: Templates,
         parts: Composition,
-        cell_type: str,
+        element: Element,
         fields: list[_dolfinx.fem.Function],
         dilatation: Dilatation,
     ) -> None:
@@ -320,7 +261,7 @@ class MeanDilatation:
         self._cells = _dolfinx.cell_dofs(cellwise).ravel()
         centres.x.array.reshape(self._polynomials.centres.shape)[self._cells] = self._polynomials.centres
         self._change, self._pressure, self._modulus = (
-            templates[kind, parts.materials, cell_type].bind(
+            templates[kind, parts.materials, element].bind(
                 spaces, parts.parameters, fields, cells=parts.cells
             )
             for kind, spaces in zip(

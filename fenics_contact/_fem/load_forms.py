@@ -10,15 +10,15 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
-from fenics_contact._fem.composition import Composition, as_in_space, integrate, on_cells
+from fenics_contact._fem.composition import Composition, integrate
 from fenics_contact._fem.templates import (
     LOADED,
     Constants,
-    per_revolution,
     scalar_constants,
     surface_measure,
     volume_measure,
 )
+from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import Ufl, evaluate
 from fenics_contact._scene.loads import BodyForce, InitialStress, Load, Pressure, ThermalStrain
@@ -40,11 +40,11 @@ def is_scalar(load: Load) -> bool:
     return isinstance(load, Pressure | ThermalStrain)
 
 
-def load_name(load: Load, cell_type: str) -> tuple[str, str, str]:
+def load_name(load: Load, element: Element) -> tuple[str, str, str]:
     """Return the name of the form of a load: kind, type of its value, cell type."""
     given = "UFL" if isinstance(load.value, Ufl) else "of position" if callable(load.value) else "numbers"
     kind = KIND.get(type(load), "surface load") + " on a region" * (region_of(load) is not None)
-    return (kind, given, cell_type)
+    return (kind, given, element.name)
 
 
 def region_of(load: Load) -> str | None:
@@ -65,41 +65,41 @@ def loaded_cells(
     return parts.cells if isinstance(load, ThermalStrain) else None
 
 
-def load_key(load: Load, materials: tuple[Material, ...], cell_type: str) -> tuple[Hashable, ...]:
+def load_key(load: Load, materials: tuple[Material, ...], element: Element) -> tuple[Hashable, ...]:
     """Return the key of everything on which the form of a load depends."""
     own = load.value if isinstance(load.value, Ufl) else None
-    return (*load_name(load, cell_type), own, materials if isinstance(load, ThermalStrain) else ())
+    return (*load_name(load, element), element, own, materials if isinstance(load, ThermalStrain) else ())
 
 
 class Symbol:
     """The value of a load as UFL, with its constants and coefficients."""
 
-    def __init__(self, load: Load, cell_type: str, number: int = 0) -> None:
+    def __init__(self, load: Load, element: Element, number: int = 0) -> None:
         """Write the value of ``load``; ``number`` distinguishes the loads of one form."""
-        width = _dolfinx.components(cell_type)
+        width = element.components
         self.constants: Constants = ()
         self.coefficients: tuple[ufl.Coefficient, ...] = ()
         if isinstance(load, InitialStress):
-            space = _dolfinx.cellwise_space(cell_type, (6,))
+            space = element.cellwise((6,))
             self.expression = ufl.Coefficient(space, count=FIRST_COUNT + number)
             self.coefficients = (self.expression,)
         elif isinstance(load.value, Ufl):
-            self.expression = from_ufl(load, load.value, cell_type)
+            self.expression = from_ufl(load, load.value, element)
         elif callable(load.value):
-            nodal = _dolfinx.nodal_space if is_scalar(load) else _dolfinx.displacement_space
-            self.expression = ufl.Coefficient(nodal(cell_type), count=FIRST_COUNT + number)
+            space = element.nodal if is_scalar(load) else element.displacements
+            self.expression = ufl.Coefficient(space, count=FIRST_COUNT + number)
             self.coefficients = (self.expression,)
         else:
-            self.constants = scalar_constants(cell_type, 1 if is_scalar(load) else width)
+            self.constants = scalar_constants(element, 1 if is_scalar(load) else width)
             self.expression = self.constants[0] if is_scalar(load) else ufl.as_vector(list(self.constants))
 
 
-def from_ufl(load: Load, value: Ufl, cell_type: str) -> Expr:
+def from_ufl(load: Load, value: Ufl, element: Element) -> Expr:
     """Return a value given as `Ufl`, written on the template, after a check of its shape."""
-    width = _dolfinx.components(cell_type)
+    width = element.components
     shape = () if is_scalar(load) else (width,)
     with user_code(f"the function given as Ufl of {type(load).__name__} on body {load.body!r}"):
-        result = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))
+        result = value.function(element.x)
         result = ufl.as_vector(list(result)) if isinstance(result, list | tuple) else ufl.as_ufl(result)
     if result.ufl_shape != shape:
         kind = "a scalar" if is_scalar(load) else f"a vector of {width} components"
@@ -153,11 +153,11 @@ def has_work(load: Load, materials: tuple[Material, ...]) -> bool:
 
 
 def load_work(
-    load: Load, materials: tuple[Material, ...], cell_type: str, value: Expr, v: Expr
+    load: Load, materials: tuple[Material, ...], element: Element, value: Expr, v: Expr
 ) -> tuple[ufl.Form, Constants]:
     """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it."""
     if isinstance(load, ThermalStrain):
-        (along,) = as_in_space(cell_type, v)
+        (along,) = element.in_space(v)
 
         def thermal(material: Any, constants: Constants) -> Expr | None:
             if is_nonlinear(material):
@@ -165,21 +165,21 @@ def load_work(
             work = value * ufl.inner(material.thermal_stress(constants), strain(along))
             return material.per_area(work, constants) if isinstance(material, Plate) else work
 
-        return integrate(materials, cell_type, thermal, volume_measure(cell_type, 2))
+        return integrate(materials, element, thermal, volume_measure(element, 2))
     if isinstance(load, InitialStress):
-        (along,) = as_in_space(cell_type, v)
+        (along,) = element.in_space(v)
         size = len(along)
         work = -ufl.inner(
             ufl.as_matrix([[as_stress(value)[i, j] for j in range(size)] for i in range(size)]), strain(along)
         )
-        return per_revolution(on_cells(work, cell_type), cell_type) * volume_measure(cell_type), ()
+        return element.integrand(element.on_cells(work)) * volume_measure(element), ()
     work = ufl.dot(value, v) if not isinstance(load, Pressure) else None
     if work is None:
-        along = ufl.as_vector([v[0], v[1]]) if _dolfinx.has_torsion(cell_type) else v
-        work = -value * ufl.dot(ufl.FacetNormal(_dolfinx.template(cell_type)), along)
-    measure = volume_measure(cell_type, 2) if isinstance(load, BodyForce) else surface_measure(cell_type)
+        normal = ufl.FacetNormal(element.template)
+        work = -value * ufl.dot(normal, element.kinematics.in_section(v))
+    measure = volume_measure(element, 2) if isinstance(load, BodyForce) else surface_measure(element)
     measure = measure if region_of(load) is None else measure(LOADED)
-    return per_revolution(work, cell_type) * measure, ()
+    return element.integrand(work) * measure, ()
 
 
 def as_stress(vector: Expr) -> Expr:

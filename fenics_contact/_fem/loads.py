@@ -13,9 +13,9 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact._base.checks import GivenVector, floats
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact._fem.composition import as_in_space, on_cells
 from fenics_contact._fem.load_forms import Symbol, load_fields, load_key, load_name, numbers_of
-from fenics_contact._fem.templates import Templates, Written, per_revolution, surface_measure
+from fenics_contact._fem.templates import Templates, Written, surface_measure
+from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.loads import Load, Pressure, TotalForce, Traction
 from fenics_contact._scene.scene import Scene
@@ -31,21 +31,21 @@ FORMS = ("growth", "softening")
 def prepare_following(templates: Templates, scene: Scene) -> None:
     """Compile the missing forms of a scene's following pressures. Collective."""
     for load in scene.following_pressures:
-        cell_type = scene.bodies[load.body].cell_type
+        element = scene.bodies[load.body].element
         for kind in FORMS:
-            name = (f"{kind} of", *load_name(load, cell_type))
-            templates.get(_key(kind, load, cell_type), name, partial(_written, kind, load, cell_type))
+            name = (f"{kind} of", *load_name(load, element))
+            templates.get(_key(kind, load, element), name, partial(_written, kind, load, element))
 
 
-def _key(kind: str, load: Pressure, cell_type: str) -> tuple[object, ...]:
-    return (kind, *load_key(load, (), cell_type))
+def _key(kind: str, load: Pressure, element: Element) -> tuple[object, ...]:
+    return (kind, *load_key(load, (), element))
 
 
-def _written(kind: str, load: Pressure, cell_type: str) -> Written:
-    (u,) = _dolfinx.field_symbols(cell_type, 1)
-    space, symbol = u.ufl_function_space(), Symbol(load, cell_type)
-    moved, v, du = as_in_space(cell_type, u, ufl.TestFunction(space), ufl.TrialFunction(space))
-    normal = ufl.FacetNormal(_dolfinx.template(cell_type))
+def _written(kind: str, load: Pressure, element: Element) -> Written:
+    (u,) = element.fields(1)
+    space, symbol = u.ufl_function_space(), Symbol(load, element)
+    moved, v, du = element.in_space(u, ufl.TestFunction(space), ufl.TrialFunction(space))
+    normal = ufl.FacetNormal(element.template)
     if len(moved) > len(normal):
         normal = ufl.as_vector([normal[0], normal[1], 0])
 
@@ -56,8 +56,8 @@ def _written(kind: str, load: Pressure, cell_type: str) -> Written:
     density = growth(v)
     if kind == "softening":
         density = -ufl.derivative(growth(v), moved, du)
-    density = per_revolution(on_cells(density, cell_type), cell_type)
-    return density * surface_measure(cell_type), symbol.constants, (u, *symbol.coefficients)
+    density = element.integrand(element.on_cells(density))
+    return density * surface_measure(element), symbol.constants, (u, *symbol.coefficients)
 
 
 class FollowingPressure:
@@ -75,7 +75,7 @@ class FollowingPressure:
         self,
         templates: Templates,
         load: Pressure,
-        cell_type: str,
+        element: Element,
         space: _dolfinx.fem.FunctionSpace,
         points: np.ndarray,
         facets: tuple[np.ndarray, np.ndarray],
@@ -83,12 +83,12 @@ class FollowingPressure:
     ) -> None:
         """Bind the forms; arguments as in `FormLibrary.load`, of which the forms are prepared."""
         self._mesh = space.mesh
-        absolute = isinstance(load.value, Ufl) or _dolfinx.is_revolved(cell_type)
+        absolute = isinstance(load.value, Ufl) or not element.kinematics.is_homogeneous
         self._points = points if absolute else points - points[0]
         self._displacement = _dolfinx.fem.Function(space)
         fields = (self._displacement, *load_fields(load, space, points, acted))
         self._growth, self._softening = (
-            templates[_key(kind, load, cell_type)].bind([space] * number, numbers_of(load), fields, facets)
+            templates[_key(kind, load, element)].bind([space] * number, numbers_of(load), fields, facets)
             for number, kind in enumerate(FORMS, start=1)
         )
 

@@ -18,6 +18,7 @@ from fenics_contact._fem.deformed_forms import FORMS, have_mean_energy, prepare_
 from fenics_contact._fem.heated import heat_expands
 from fenics_contact._fem.kinematics import Dilatation, GaussPoints, MeanDilatation, assembled, mean_fields
 from fenics_contact._fem.templates import Templates, quadrature_degree
+from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
@@ -71,7 +72,7 @@ class History:
             if name not in values:
                 continue
             body, mesh = new.bodies[name], old.bodies[name].mesh
-            degree = quadrature_degree(body.cell_type)
+            degree = quadrature_degree(body.element)
             found = transfer.at_gauss_points(mesh, body.mesh, degree, values[name])
             for number, material in enumerate(body.materials):
                 if isinstance(material, HistoryMaterial):
@@ -89,7 +90,7 @@ def history_size(body: Body) -> int:
 
 def _shape(body: Body) -> tuple[int, int, int]:
     cell = CELL_TYPES[body.mesh.cell_type]
-    points = len(quadrature(cell, quadrature_degree(body.cell_type))[1])
+    points = len(quadrature(cell, quadrature_degree(body.element))[1])
     return body.mesh.n_cells, points, history_size(body)
 
 
@@ -173,7 +174,7 @@ class HistoryMechanics:
     def __init__(
         self,
         parts: Composition,
-        cell_type: str,
+        element: Element,
         space: _dolfinx.fem.FunctionSpace,
         points: np.ndarray,
         others: Mechanics | None,
@@ -186,8 +187,8 @@ class HistoryMechanics:
         nodes, dofs = self._blocks = _dolfinx.node_dofs(space)
         by_block = np.empty_like(points)
         by_block[dofs] = points[nodes]
-        self._gauss = GaussPoints(space, cell_type, by_block)
-        self._dilatation = Dilatation(space, cell_type, by_block)
+        self._gauss = GaussPoints(space, element, by_block)
+        self._dilatation = Dilatation(space, element, by_block)
         self._others = others
         every = np.arange(self._gauss.shape[0])
         self._parts = [
@@ -319,7 +320,7 @@ class HyperelasticMechanics:
         self,
         templates: Templates,
         parts: Composition,
-        cell_type: str,
+        element: Element,
         space: _dolfinx.fem.FunctionSpace,
         points: np.ndarray,
     ) -> None:
@@ -328,22 +329,22 @@ class HyperelasticMechanics:
         by_block = np.empty_like(points)
         by_block[dofs] = points[nodes]
         self._mesh, self._points = space.mesh, points
-        self._dilatation = Dilatation(space, cell_type, by_block)
+        self._dilatation = Dilatation(space, element, by_block)
         self._displacement = _dolfinx.fem.Function(space)
-        fields = [self._displacement, *mean_fields(space.mesh, cell_type)]
+        fields = [self._displacement, *mean_fields(space.mesh, element)]
         self._heat: _dolfinx.fem.Function | None = None
         if any(map(heat_expands, parts.materials)):
             self._heat = _dolfinx.fem.Function(_dolfinx.scalar_space(space.mesh, 1))
             fields.append(self._heat)
         self._energy, self._force, self._tangent = (
-            templates[kind, parts.materials, cell_type].bind(
+            templates[kind, parts.materials, element].bind(
                 [space] * number, parts.parameters, fields, mesh=space.mesh, cells=parts.cells
             )
             for number, kind in enumerate(FORMS)
         )
         self._mean: MeanDilatation | None = None
         if have_mean_energy(parts.materials):
-            self._mean = MeanDilatation(templates, parts, cell_type, fields, self._dilatation)
+            self._mean = MeanDilatation(templates, parts, element, fields, self._dilatation)
 
     def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
         """Assemble; see `Mechanics.at`."""
@@ -393,7 +394,7 @@ def prepare_mechanics(templates: Templates, scene: Scene) -> None:
         for materials in material_sets(body):
             others = [material for material in materials if not isinstance(material, HistoryMaterial)]
             if others and any(map(is_nonlinear, materials)):
-                prepare_forms(templates, materials, body.cell_type)
+                prepare_forms(templates, materials, body.element)
 
 
 class LinearMechanics:

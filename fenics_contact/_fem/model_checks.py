@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,13 +14,13 @@ from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.composition import Composition
 from fenics_contact._fem.templates import Templates
+from fenics_contact._kinematics.base import Kinematics
+from fenics_contact._kinematics.element import Element, plain_element
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import Hyperelasticity
-from fenics_contact.materials.kernels import motions_of_revolution
 from fenics_contact.materials.plastic import HistoryMaterial, MaterialResponse
-from fenics_contact.mesh.cell_types import CELL_TYPES
 
 if TYPE_CHECKING:
     from fenics_contact._fem.mechanics import Mechanics, Response
@@ -164,25 +165,24 @@ ROUNDING = 1e-11
 Bind = Callable[["_dolfinx.fem.FunctionSpace"], "_dolfinx.fem.Form"]
 
 
-def unit_cell_stiffness(cell_type: str, bind: Bind) -> np.ndarray:
+def unit_cell_stiffness(element: Element, bind: Bind) -> np.ndarray:
     """Return the stiffness matrix of a cell of edge length one, dense, block by block."""
-    return stiffness_of_cell(_unit_cell(cell_type), cell_type, bind)[0]
+    return stiffness_of_cell(_unit_cell(element), element, bind)[0]
 
 
-def _unit_cell(cell_type: str) -> np.ndarray:
-    """Return the nodes of a cell of edge length one, of a body of revolution with radii around one."""
-    nodes = CELL_TYPES[_dolfinx.of_mesh(cell_type)].nodes
-    return nodes + np.array([0.5, 0.0]) if _dolfinx.is_revolved(cell_type) else nodes
+def _unit_cell(element: Element) -> np.ndarray:
+    """Return the nodes of a cell of edge length one."""
+    return element.kinematics.unit_cell(element.cell.nodes)
 
 
-def check_model(material: Material, cell_type: str, bind: Bind) -> None:
+def check_model(material: Material, element: Element, bind: Bind) -> None:
     """Check stiffness and kernel of a material on one skew cell.
 
     A kernel with a missing mode makes the generalised inverse blow up, one with an extra mode removes real
     stiffness; both could be taken for a solution.
     """
     name = type(material).__name__
-    K, points = stiffness_of_cell(skewed(_unit_cell(cell_type)), cell_type, bind)
+    K, points = stiffness_of_cell(skewed(_unit_cell(element)), element, bind)
     if not np.isfinite(K).all():
         raise InvalidInputError(
             f"stiffness and load must be finite, got NaN or infinity in the stiffness of {name}: check the "
@@ -205,14 +205,14 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
             f"the energy of a material must not be negative, {name} has the eigenvalue {energies[0]:.3g} "
             f"beside {energies[-1]:.3g}: check signs and parameters"
         )
-    R = _checked_kernel(material, points, cell_type)
+    R = _checked_kernel(material, points, element)
     check_kernel(K, R, f"material {name}")
     claimed, counted = R.shape[1], int((energies < ROUNDING * energies[-1]).sum())
     # A cell of reduced integration has modes without energy of its own, whatever it is made of.
-    if counted > claimed and not _dolfinx.is_reduced(cell_type):
+    if counted > claimed and not element.integration.has_hourglasses:
         raise InvalidInputError(
             f"the kernel of a material must hold every motion without energy, that of {name} has {claimed} "
-            f"modes and a {cell_type} has {counted} of them: add the missing ones to kernel(points)"
+            f"modes and a {element.name} has {counted} of them: add the missing ones to kernel(points)"
         )
 
 
@@ -238,18 +238,13 @@ def check_kernel(
         )
 
 
-def kernel_of(material: Material, points: np.ndarray, cell_type: str = "") -> np.ndarray:
-    """Return the modes without energy of a material at points, shape (n, components, n_modes).
+def kernel_of(material: Material, points: np.ndarray, kinematics: Kinematics) -> np.ndarray:
+    """Return the modes without energy of a material at points, shape (n, components, n_modes)."""
+    return kinematics.kernel(partial(_own_kernel, material), points)
 
-    A body of revolution has the translation along its axis and, where it may twist, the turn about it, unless
-    the material resists them.
-    """
-    if _dolfinx.is_revolved(cell_type):
-        in_space = kernel_of(material, np.pad(points, ((0, 0), (0, 1)))).reshape(3 * len(points), -1)
-        modes = motions_of_revolution(points, _dolfinx.has_torsion(cell_type))
-        moved = np.pad(modes, ((0, 0), (0, 3 - modes.shape[1]), (0, 0))).reshape(len(in_space), -1)
-        rest = moved - in_space @ np.linalg.lstsq(in_space, moved, rcond=None)[0]
-        return modes[..., np.abs(rest).max(axis=0) <= 1e-8]
+
+def _own_kernel(material: Material, points: np.ndarray) -> np.ndarray:
+    """Return the modes without energy in the space of a material, (n, dim, n_modes)."""
     name = type(material).__name__
     with user_code(f"the kernel of material {name}"):
         modes = np.asarray(material.kernel(points), dtype=np.float64)
@@ -262,8 +257,8 @@ def kernel_of(material: Material, points: np.ndarray, cell_type: str = "") -> np
     return modes
 
 
-def _checked_kernel(material: Material, points: np.ndarray, cell_type: str) -> np.ndarray:
-    name, R = type(material).__name__, kernel_of(material, points, cell_type)
+def _checked_kernel(material: Material, points: np.ndarray, element: Element) -> np.ndarray:
+    name, R = type(material).__name__, kernel_of(material, points, element.kinematics)
     R = R.reshape(R.shape[0] * R.shape[1], R.shape[2])
     if np.linalg.matrix_rank(R, tol=1e-8 * max(np.abs(R).max(initial=0.0), 1e-300)) < R.shape[1]:
         raise InvalidInputError(
@@ -280,13 +275,13 @@ def skewed(nodes: np.ndarray) -> np.ndarray:
     return np.asarray(nodes + 0.08 * shift, dtype=np.float64)
 
 
-def stiffness_of_cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple[np.ndarray, np.ndarray]:
+def stiffness_of_cell(vertices: np.ndarray, element: Element, bind: Bind) -> tuple[np.ndarray, np.ndarray]:
     """Return the stiffness of one cell, dense, and its points, both block by block.
 
     `vertices`: coordinates in VTK order, shape (n, dim), [length].
     """
-    mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], _dolfinx.of_mesh(cell_type))
-    space = _dolfinx.coefficient(mesh, "u", _dolfinx.components(cell_type)).function_space
+    mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], element.cells)
+    space = _dolfinx.coefficient(mesh, "u", element.components).function_space
     nodes, dofs = _dolfinx.node_dofs(space)
     points = np.empty_like(vertices)
     points[dofs] = vertices[nodes]
@@ -324,20 +319,26 @@ def check_hyperelastic(
         >>> from fenics_contact.materials import NeoHooke
         >>> check_hyperelastic(NeoHooke(young_modulus=10.0, poisson_ratio=0.3))
     """
+    cell_type = cell_type or ("hexahedron" if 3 in material.dims else "quadrilateral")
+    check_deformed(material, plain_element(cell_type), templates or Templates(MPI.COMM_SELF), tolerance)
+
+
+def check_deformed(
+    material: Hyperelasticity, element: Element, templates: Templates, tolerance: float = 1e-6
+) -> None:
+    """Check a hyperelastic model on one cell, see `check_hyperelastic`."""
     # Scenes of small strains load neither.
     from fenics_contact._fem.deformed_forms import prepare_forms
     from fenics_contact._fem.mechanics import HyperelasticMechanics
 
-    cell_type = cell_type or ("hexahedron" if 3 in material.dims else "quadrilateral")
-    templates = Templates(MPI.COMM_SELF) if templates is None else templates
-    prepare_forms(templates, (material,), cell_type)
-    name, vertices = type(material).__name__, skewed(_unit_cell(cell_type))
-    mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], _dolfinx.of_mesh(cell_type))
-    space = _dolfinx.coefficient(mesh, "u", _dolfinx.components(cell_type)).function_space
+    prepare_forms(templates, (material,), element)
+    name, vertices = type(material).__name__, skewed(_unit_cell(element))
+    mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], element.cells)
+    space = _dolfinx.coefficient(mesh, "u", element.components).function_space
     nodes, dofs = _dolfinx.node_dofs(space)
     points = np.empty_like(vertices)
     points[dofs] = vertices[nodes]
-    cell = HyperelasticMechanics(templates, Composition((material,)), cell_type, space, vertices)
+    cell = HyperelasticMechanics(templates, Composition((material,)), element, space, vertices)
     u = 0.05 * np.sin(1.7 * np.arange(points.size) ** 1.3).reshape(points.shape)
     rest = _finite(cell, np.zeros(points.size), name)
     scale = float(np.abs(rest.stiffness).max() * np.abs(u).max())
@@ -349,7 +350,7 @@ def check_hyperelastic(
             "subtract it, as − μ ln J does in μ/2 (tr FᵀF − 3 − 2 ln J)"
         )
     _check_derivatives(cell, u.ravel(), scale, name, tolerance)
-    if not _dolfinx.is_revolved(cell_type):  # no body of revolution turns
+    if element.kinematics.can_rotate:
         _check_rotated_energy(cell, points, u, scale, name)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 import ufl
@@ -16,9 +17,11 @@ from fenics_contact import _dolfinx
 from fenics_contact._base.fingerprint import require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.requirements import check_compiler
+from fenics_contact._kinematics.element import Element
+from fenics_contact._kinematics.integration import FULL
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.ranks import made_once
-from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
+from fenics_contact.mesh.cell_types import quadrature, shape_values
 from fenics_contact.mesh.quality import jacobians
 
 #: Gauss rule of the volume by shape: two points per direction on tensor-product cells, one on simplices suit
@@ -165,55 +168,42 @@ def _text(
     return form.signature(), places
 
 
-def scalar_constants(cell_type: str, count: int) -> Constants:
+def scalar_constants(element: Element, count: int) -> Constants:
     """Return ``count`` UFL constants on the template."""
-    return tuple(_dolfinx.constant_symbol(cell_type) for _ in range(count))
+    return tuple(element.constant() for _ in range(count))
 
 
-def volume_measure(cell_type: str, degree: int | None = None) -> ufl.Measure:
+def volume_measure(element: Element, degree: int | None = None) -> ufl.Measure:
     """Return dx on the template with the package's quadrature degree, or the given one.
 
     The given one is for linear cells; it is doubled on quadratic ones that are not reduced.
     """
-    metadata = {"quadrature_degree": quadrature_degree(cell_type, degree)}
-    return ufl.dx(domain=_dolfinx.template(cell_type), metadata=metadata)
+    metadata = {"quadrature_degree": quadrature_degree(element, degree)}
+    return ufl.dx(domain=element.template, metadata=metadata)
 
 
-def resisting(form: ufl.Form, cell_type: str, share: float = 1e-6) -> ufl.Form:
-    """Return a stiffness of cells, in which reduced ones that should resist all motions do.
+def stiffness_form(form: ufl.Form, element: Element) -> ufl.Form:
+    """Return a stiffness by the integration of an element."""
+    degree = quadrature_degree(replace(element, integration=FULL))
 
-    At sections of bodies that are one cell across, reduced integration leaves motions without energy, which
-    no other cells resist: they get some by a share of full integration.
+    def in_full(form: ufl.Form) -> ufl.Form:
+        whole = {"quadrature_degree": degree}
+        return ufl.Form([integral.reconstruct(metadata=whole) for integral in form.integrals()])
 
-    `share`: of full integration; stresses change by about as much.
-    """
-    if not _dolfinx.is_resisting(cell_type):
-        return form
-    whole = {"quadrature_degree": QUADRATURE_DEGREE[_dolfinx.shape(cell_type)] * _dolfinx.degree(cell_type)}
-    full = ufl.Form([integral.reconstruct(metadata=whole) for integral in form.integrals()])
-    return (1.0 - share) * form + share * full
+    return element.integration.stiffness(form, in_full)
 
 
-def quadrature_degree(cell_type: str, degree: int | None = None) -> int:
+def quadrature_degree(element: Element, degree: int | None = None) -> int:
     """Return the degree of the package's quadrature on cells, or of that given for linear ones."""
     if degree is None:
-        degree = QUADRATURE_DEGREE[_dolfinx.shape(cell_type)]
-        if _dolfinx.is_revolved(cell_type):
-            degree = max(degree, 2)  # the hoop strain varies in linear triangles, too
-    return int(degree if _dolfinx.is_reduced(cell_type) else degree * _dolfinx.degree(cell_type))
+        degree = max(QUADRATURE_DEGREE[element.cell.shape_name], element.kinematics.least_degree)
+    return element.integration.degree(degree, element.cell.order)
 
 
-def surface_measure(cell_type: str) -> ufl.Measure:
+def surface_measure(element: Element) -> ufl.Measure:
     """Return ds of the loaded surface on the template."""
-    degree = 2 * _dolfinx.degree(cell_type)
-    return ufl.ds(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})(LOADED)
-
-
-def per_revolution(density: Expr, cell_type: str) -> Expr:
-    """Return a density times the circumference 2 π r on bodies of revolution, as it is on others."""
-    if not _dolfinx.is_revolved(cell_type):
-        return density
-    return 2 * np.pi * ufl.SpatialCoordinate(_dolfinx.template(cell_type))[0] * density
+    degree = 2 * element.cell.order
+    return ufl.ds(domain=element.template, metadata={"quadrature_degree": degree})(LOADED)
 
 
 #: Cells with a dilatation that is linear in each; it is constant in all others. Hexahedra and quadrilaterals
@@ -225,9 +215,9 @@ LINEAR = ("quadrilateral9", "hexahedron27")
 UNSEEN = ("tetrahedron10",)
 
 
-def polynomial_size(cell_type: str) -> int:
+def polynomial_size(element: Element) -> int:
     """Return the number of coefficients of a polynomial: one, or one more than the dimension."""
-    return 1 + _dolfinx.dimension(cell_type) if _dolfinx.of_mesh(cell_type) in LINEAR else 1
+    return 1 + element.dim if element.cells in LINEAR else 1
 
 
 class CellPolynomials:
@@ -239,21 +229,20 @@ class CellPolynomials:
         distorted cells, those of reference coordinates do not.
     """
 
-    def __init__(self, points: np.ndarray, cells: np.ndarray, cell_type: str) -> None:
+    def __init__(self, points: np.ndarray, cells: np.ndarray, element: Element) -> None:
         """Evaluate them at the Gauss points.
 
         `points`: coordinates, shape (n, dim), [length]; `cells`: nodes of the cells in VTK order, shape
         (n_cells, nodes of a cell).
         """
-        cell = CELL_TYPES[_dolfinx.of_mesh(cell_type)]
-        positions, weights = quadrature(cell, quadrature_degree(cell_type))
+        cell = element.cell
+        positions, weights = quadrature(cell, quadrature_degree(element))
         jacobian = jacobians(points, cells, positions)
         self.weights = np.broadcast_to(jacobian, (len(cells), len(weights))) * weights
         places = shape_values(cell, positions) @ points[cells]
-        if _dolfinx.is_revolved(cell_type):
-            self.weights = 2 * np.pi * places[..., 0] * self.weights
+        self.weights = element.kinematics.around(places[..., 0]) * self.weights
         self.centres = np.einsum("cq,cqd->cd", self.weights, places) / self.weights.sum(axis=1)[:, None]
-        linear = (places - self.centres[:, None])[..., : polynomial_size(cell_type) - 1]
+        linear = (places - self.centres[:, None])[..., : polynomial_size(element) - 1]
         self.values = np.concatenate([np.ones((*self.weights.shape, 1)), linear], axis=2)
         #: Inverse of ∫ ψ_i ψ_j, shape (n_cells, n, n).
         self.inverse = np.linalg.inv(self.values.swapaxes(1, 2) @ (self.weights[..., None] * self.values))
@@ -283,15 +272,15 @@ class CellPolynomials:
         return np.asarray((self.values @ coefficients[..., None])[..., 0])
 
 
-def polynomial(coefficients: Expr, centre: Expr, cell_type: str) -> Expr:
+def polynomial(coefficients: Expr, centre: Expr, element: Element) -> Expr:
     """Return a polynomial on the template."""
-    if _dolfinx.of_mesh(cell_type) not in LINEAR:
+    if element.cells not in LINEAR:
         return coefficients
-    x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
+    x = element.x
     slopes = (coefficients[1 + i] * (x[i] - centre[i]) for i in range(len(x)))
     return coefficients[0] + sum(slopes)
 
 
-def coefficient_shape(cell_type: str) -> tuple[int, ...]:
+def coefficient_shape(element: Element) -> tuple[int, ...]:
     """Return the shape of a polynomial's coefficients in one cell."""
-    return (polynomial_size(cell_type),) if _dolfinx.of_mesh(cell_type) in LINEAR else ()
+    return (polynomial_size(element),) if element.cells in LINEAR else ()

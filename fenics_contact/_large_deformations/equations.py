@@ -336,7 +336,7 @@ class Equations:
         points = mesh.by_input_node(body.mesh.points[mesh.nodes])
         parts = composition(body, mesh.cells)
         forms = self.decomposition.forms
-        mechanics = forms.mechanics(parts, body.cell_type, mesh.space, points)
+        mechanics = forms.mechanics(parts, body.element, mesh.space, points)
         return mechanics if mesh.expanded is None else _OfSeveralShapes(mesh, mechanics)
 
     def _with_free(self, torn: TornSystem, unbalanced: Vector, multiplier: Vector) -> Vector:

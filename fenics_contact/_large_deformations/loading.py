@@ -305,7 +305,7 @@ class FollowingPressures:
                     if not len(facets[0]):
                         continue
                     acted = mesh.acted(body.mesh.surfaces[load.surface])
-                    points, kind = mesh.by_input_node(body.mesh.points[mesh.nodes]), body.cell_type
+                    points, kind = mesh.by_input_node(body.mesh.points[mesh.nodes]), body.element
                     pressure = forms.following(load, kind, mesh.space, points, facets, acted)
                     self._acting.append((number, pressure))
 

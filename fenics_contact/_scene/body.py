@@ -9,20 +9,20 @@ from typing import Literal
 
 import numpy as np
 
-from fenics_contact import _dolfinx
 from fenics_contact._base.checks import brief, checked
 from fenics_contact._base.display import counted, displayed
+from fenics_contact._kinematics.base import Kinematics
+from fenics_contact._kinematics.choice import integration_of, kinematics_of
+from fenics_contact._kinematics.element import Element
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material, thickness_of
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain
-from fenics_contact.materials.kernels import motions_of_revolution, rigid_body_modes
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
-from fenics_contact.mesh.collapsed import has_collapsed, places_of
+from fenics_contact.mesh.cell_types import CELL_TYPES
+from fenics_contact.mesh.collapsed import has_collapsed
 from fenics_contact.mesh.faces import computed_rounding
-from fenics_contact.mesh.quality import cell_volumes, jacobians
 
 
 @displayed
@@ -96,40 +96,34 @@ class Body:
         return tuple(different)
 
     @property
-    def cell_type(self) -> str:
-        """The type of its cells for forms: others if a body is one of revolution, or integration reduced."""
-        cells = self.mesh.cell_type
-        if self.integration == "reduced":
-            cells = _dolfinx.reduced(cells, resisting=bool(self.mesh.cuts))
-        return _dolfinx.revolved(cells, self.torsion) if self.axisymmetric else cells
+    def kinematics(self) -> Kinematics:
+        """What its displacement consists of, and how areas and volumes are measured."""
+        return kinematics_of(self.mesh.dim, self.axisymmetric, self.torsion)
+
+    @property
+    def element(self) -> Element:
+        """The finite element for which its forms are written."""
+        integration = integration_of(self.integration, thin=bool(self.mesh.cuts))
+        return Element(self.mesh.cell_type, self.kinematics, integration)
 
     @property
     def components(self) -> int:
         """Number of components of its displacement."""
-        return 3 if self.torsion else self.mesh.dim
+        return self.kinematics.components
 
     @property
     def motions(self) -> int:
         """Number of its rigid motions."""
-        return 1 + self.torsion if self.axisymmetric else 3 * (self.mesh.dim - 1)
+        return self.kinematics.motions
 
     @property
     def on_axis(self) -> np.ndarray:
         """Which nodes of a body of revolution lie on its axis, shape (n_nodes,); none of others."""
-        if not self.axisymmetric:
-            return np.zeros(self.mesh.n_nodes, dtype=bool)
-        return np.asarray(self.mesh.points[:, 0] <= computed_rounding(self.mesh.points))
+        return self.kinematics.on_axis(self.mesh.points)
 
     def rigid_modes(self, at: np.ndarray | None = None) -> np.ndarray:
-        """Return its rigid motions at its nodes or elsewhere, see `rigid_body_modes`.
-
-        A body of revolution has the translation along its axis alone, shape (n, 2, 1), where it may twist
-        also the turn about it, (n, 3, 2).
-        """
-        points = self.mesh.points
-        if not self.axisymmetric:
-            return rigid_body_modes(points, at)
-        return motions_of_revolution(points if at is None else at, self.torsion, float(points[:, 0].max()))
+        """Return its rigid motions at its nodes or elsewhere, see `rigid_body_modes`."""
+        return self.kinematics.rigid_modes(self.mesh.points, at)
 
     @property
     def volume(self) -> float:
@@ -138,16 +132,8 @@ class Body:
 
     def volume_of(self, region: str | None = None) -> float:
         """Return the volume of a region of its mesh, by default of all of it, see `volume`."""
-        if region is None and not self.axisymmetric:
-            return self.mesh.volume
         cells = self.mesh.cells if region is None else self.mesh.cells[self.mesh.regions[region]]
-        if not self.axisymmetric:
-            return float(cell_volumes(self.mesh.points, cells).sum())
-        cell = CELL_TYPES[self.mesh.cell_type]
-        positions, weights = quadrature(cell, 2 * cell.order)
-        radii = places_of(self.mesh.points, cells)[..., 0] @ shape_values(cell, positions).T
-        around = 2 * np.pi * radii * jacobians(self.mesh.points, cells, positions)
-        return float((around @ weights).sum())
+        return self.kinematics.volume(self.mesh, cells)
 
     @property
     def has_thickness(self) -> bool:

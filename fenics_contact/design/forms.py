@@ -12,7 +12,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import as_in_space, integrate, material_sets
+from fenics_contact._fem.composition import integrate, material_sets
 from fenics_contact._fem.forms import Temperature, stress_in_space, stress_left
 from fenics_contact._fem.load_forms import Symbol, load_key, load_name, load_work
 from fenics_contact._fem.templates import (
@@ -23,6 +23,7 @@ from fenics_contact._fem.templates import (
     scalar_constants,
     volume_measure,
 )
+from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.loads import Load
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.feti.subdomain import Subdomain
@@ -83,58 +84,58 @@ class ShapeForms:
         """Names of the forms compiled so far."""
         return self._templates.names
 
-    def virtual_work_by_shape(self, materials: Materials, cell_type: str) -> Template:
+    def virtual_work_by_shape(self, materials: Materials, element: Element) -> Template:
         """∂/∂x of the work of the stresses at u along w, a(u, w) in small strain; coefficients (u, w)."""
 
         def write() -> Written:
-            u, w = _dolfinx.field_symbols(cell_type, 2)
-            moved, along = as_in_space(cell_type, u, w)
+            u, w = element.fields(2)
+            moved, along = element.in_space(u, w)
             form, constants = integrate(
                 materials,
-                cell_type,
+                element,
                 lambda m, c: _virtual_work(m, moved, along, c),
-                volume_measure(cell_type),
+                volume_measure(element),
             )
-            return _by_shape(form, cell_type), constants, [u, w]
+            return _by_shape(form, element), constants, [u, w]
 
-        name = ("work by shape", *(type(material) for material in materials), cell_type)
-        return self._templates.get(("work by shape", materials, cell_type), name, write)
+        name = ("work by shape", *(type(material) for material in materials), element.name)
+        return self._templates.get(("work by shape", materials, element), name, write)
 
-    def load_by_shape(self, load: Load, materials: Materials, cell_type: str) -> Template:
+    def load_by_shape(self, load: Load, materials: Materials, element: Element) -> Template:
         """∂/∂x of the work of a load along w at fixed nodal values of its field; coefficients (w, field)."""
-        return self._of_load("by shape", load, materials, cell_type, _by_shape)
+        return self._of_load("by shape", load, materials, element, _by_shape)
 
-    def load_by_field(self, load: Load, materials: Materials, cell_type: str) -> Template:
+    def load_by_field(self, load: Load, materials: Materials, element: Element) -> Template:
         """Derivative of the work of a load along w by the values of its field; the same coefficients."""
 
-        def by_field(form: ufl.Form, cell_type: str) -> ufl.Form:
-            return ufl.derivative(form, Symbol(load, cell_type).expression)
+        def by_field(form: ufl.Form, element: Element) -> ufl.Form:
+            return ufl.derivative(form, Symbol(load, element).expression)
 
-        return self._of_load("by field", load, materials, cell_type, by_field)
+        return self._of_load("by field", load, materials, element, by_field)
 
     def _of_load(
         self,
         what: str,
         load: Load,
         materials: Materials,
-        cell_type: str,
-        differentiate: Callable[[ufl.Form, str], ufl.Form],
+        element: Element,
+        differentiate: Callable[[ufl.Form, Element], ufl.Form],
     ) -> Template:
         def write() -> Written:
-            (w,) = _dolfinx.field_symbols(cell_type, 1)
-            symbol = Symbol(load, cell_type)
-            form, constants = load_work(load, materials, cell_type, symbol.expression, w)
+            (w,) = element.fields(1)
+            symbol = Symbol(load, element)
+            form, constants = load_work(load, materials, element, symbol.expression, w)
             coefficients = [w, *symbol.coefficients]
-            return differentiate(form, cell_type), (*symbol.constants, *constants), coefficients
+            return differentiate(form, element), (*symbol.constants, *constants), coefficients
 
-        key = (f"load {what}", *load_key(load, materials, cell_type))
-        return self._templates.get(key, (what, *load_name(load, cell_type)), write)
+        key = (f"load {what}", *load_key(load, materials, element))
+        return self._templates.get(key, (what, *load_name(load, element)), write)
 
     def functional(
         self,
         density: Density,
         materials: Materials,
-        cell_type: str,
+        element: Element,
         by: str,
         temperature: Temperature = Temperature(),
     ) -> Template:
@@ -148,31 +149,31 @@ class ShapeForms:
         """
 
         def write() -> Written:
-            (u,) = _dolfinx.field_symbols(cell_type, 1)
-            x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
-            change, numbers, fields = temperature.write(cell_type)
-            own = scalar_constants(cell_type, density.constants)
+            (u,) = element.fields(1)
+            x = element.x
+            change, numbers, fields = temperature.write(element)
+            own = scalar_constants(element, density.constants)
             stress_of = stress_in_space if density.in_space else stress_left
-            (moved,) = as_in_space(cell_type, u)
+            (moved,) = element.in_space(u)
 
             def write_density(material: Material, constants: Constants) -> Expr:
                 with user_code(f"the integrand of {density.name!r}"):
                     stress = stress_of(material, moved, constants, change)
                     return density.integrand(u, x, stress, *own)
 
-            measure = volume_measure(cell_type, density.degree)
-            form, constants = integrate(materials, cell_type, write_density, measure)
+            measure = volume_measure(element, density.degree)
+            form, constants = integrate(materials, element, write_density, measure)
             if by == "displacement":
-                form = ufl.derivative(form, u, ufl.TestFunction(_dolfinx.displacement_space(cell_type)))
+                form = ufl.derivative(form, u, ufl.TestFunction(element.displacements))
             elif by == "shape":
-                form = _by_shape(form, cell_type)
+                form = _by_shape(form, element)
             elif by == "temperature":
                 form = ufl.derivative(form, fields[0])
             return form, (*own, *numbers, *constants), [u, *fields]
 
         types = tuple(type(material) for material in materials)
-        key = (density, by, materials, cell_type, temperature.key)
-        return self._templates.get(key, (density.name, by, *types, cell_type), write)
+        key = (density, by, materials, element, temperature.key)
+        return self._templates.get(key, (density.name, by, *types, element.name), write)
 
 
 def _virtual_work(material: Any, u: Expr, w: Expr, constants: Constants) -> Expr:
@@ -180,9 +181,9 @@ def _virtual_work(material: Any, u: Expr, w: Expr, constants: Constants) -> Expr
     return material.work(u, w, constants) if is_nonlinear(material) else material.stiffness(u, w, constants)
 
 
-def _by_shape(form: ufl.Form, cell_type: str) -> ufl.Form:
-    velocity = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
-    return ufl.derivative(form, ufl.SpatialCoordinate(_dolfinx.template(cell_type)), velocity)
+def _by_shape(form: ufl.Form, element: Element) -> ufl.Form:
+    velocity = ufl.TestFunction(element.displacements)
+    return ufl.derivative(form, element.x, velocity)
 
 
 def sets_in_use(torn: TornSystem, body: str) -> list[Materials]:

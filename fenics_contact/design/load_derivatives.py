@@ -162,11 +162,11 @@ def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: 
         return np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
     for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies without a part on them
         for materials in sets_in_use(torn, name):
-            forms.virtual_work_by_shape(materials, body.cell_type)
+            forms.virtual_work_by_shape(materials, body.element)
 
     def on_subdomain(subdomain: Subdomain, functions: Functions) -> np.ndarray:
-        parts, cell_type = subdomain.material, torn.scene.bodies[subdomain.mesh.body].cell_type
-        template = forms.virtual_work_by_shape(parts.materials, cell_type)
+        parts, element = subdomain.material, torn.scene.bodies[subdomain.mesh.body].element
+        template = forms.virtual_work_by_shape(parts.materials, element)
         form = template.bind([subdomain.mesh.space], parts.parameters, functions, cells=parts.cells)
         return _dolfinx.assemble_vector(form)
 
@@ -180,9 +180,9 @@ def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np
     for load in spread:  # all ranks compile
         body = torn.scene.bodies[load.body]
         for materials in sets_in_use(torn, load.body):
-            forms.load_by_shape(load, materials, body.cell_type)
+            forms.load_by_shape(load, materials, body.element)
             if callable(load.value):
-                forms.load_by_field(load, materials, body.cell_type)
+                forms.load_by_field(load, materials, body.element)
 
     def on_subdomain(subdomain: Subdomain, functions: Functions) -> np.ndarray:
         result = np.zeros(subdomain.mesh.size)
@@ -215,10 +215,10 @@ def _load_by_shape(
     cells = loaded_cells(load, parts, body, mesh.cells)
     fields = load_fields(load, mesh.space, body.mesh.points[nodes], acted)
     values, given = load_parameters(load, parts), [*functions, *fields]
-    template = forms.load_by_shape(load, parts.materials, body.cell_type)
+    template = forms.load_by_shape(load, parts.materials, body.element)
     result = _dolfinx.assemble_vector(template.bind([mesh.space], values, given, facets, cells=cells))
     for field in fields:
-        template = forms.load_by_field(load, parts.materials, body.cell_type)
+        template = forms.load_by_field(load, parts.materials, body.element)
         form = template.bind([field.function_space], values, given, facets, cells=cells)
         by_values = _dolfinx.assemble_vector(form)
         result += field_by_places(torn, subdomain, load, field.function_space, by_values, forms.moving)

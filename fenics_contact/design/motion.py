@@ -22,6 +22,7 @@ from fenics_contact._base.libraries import MPI, PETSc, check_not_forked
 from fenics_contact._base.sparse import dispose_with
 from fenics_contact._fem.forms import temperature_of
 from fenics_contact._fem.templates import Template, volume_measure
+from fenics_contact._kinematics.element import Element, plain_element
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.parts import mirrored, planes_of
@@ -166,7 +167,7 @@ class MeshMotion:
         self.moving, self.held = moving, held
         mesh = body_mesh(decomposition, name, body)
         space = _dolfinx.scalar_space(mesh, 1)
-        template = Template(mesh.comm, _stiffness(body.mesh.cell_type, stiffening), ())
+        template = Template(mesh.comm, _stiffness(plain_element(body.mesh.cell_type), stiffening), ())
         matrix = _dolfinx.assemble_matrix(template.bind([space, space], ()))
         given = np.zeros(body.mesh.n_nodes, dtype=bool)
         given[moving] = True
@@ -225,12 +226,12 @@ class MeshMotion:
         return np.asarray(result[self.moving] + following)
 
 
-def _stiffness(cell_type: str, stiffening: float) -> ufl.Form:
+def _stiffness(element: Element, stiffening: float) -> ufl.Form:
     """Write ∫ ∇u · ∇v det(J)^(−χ) dx."""
-    V, mesh = _dolfinx.nodal_space(cell_type), _dolfinx.template(cell_type)
+    V, mesh = element.nodal, element.template
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     weight = abs(ufl.JacobianDeterminant(mesh)) ** (-stiffening)
-    return weight * ufl.inner(ufl.grad(u), ufl.grad(v)) * volume_measure(cell_type, 2)
+    return weight * ufl.inner(ufl.grad(u), ufl.grad(v)) * volume_measure(element, 2)
 
 
 def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign) -> MeshMotion:
@@ -442,13 +443,13 @@ class BodyIntegral:
     def _prepare(self, by: str, numbers: tuple[float, ...]) -> Bind:
         """Compile the integral or a derivative, return a function that binds it to subdomains. Collective."""
         body = self.state.scene.bodies[self.body]
-        cell_type, temperature = body.cell_type, temperature_of(self.state.scene.loads, self.body)
+        element, temperature = body.element, temperature_of(self.state.scene.loads, self.body)
         for materials in sets_in_use(self.state.torn, self.body):
-            self.forms.functional(self.density, materials, cell_type, by, temperature)
+            self.forms.functional(self.density, materials, element, by, temperature)
 
         def bind(subdomain: Subdomain, functions: Functions, spaces: Spaces) -> _dolfinx.fem.Form:
             parts, mesh = subdomain.material, subdomain.mesh.space.mesh
-            template = self.forms.functional(self.density, parts.materials, cell_type, by, temperature)
+            template = self.forms.functional(self.density, parts.materials, element, by, temperature)
             points = body.mesh.points[np.sort(subdomain.mesh.nodes)]
             fields = [*functions, *temperature.fields(mesh, points)]
             values = (*numbers, *temperature.numbers, *parts.parameters)

@@ -17,6 +17,7 @@ from fenics_contact._fem.composition import Composition, composition
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.load_forms import has_work, loaded_cells, region_of
 from fenics_contact._fem.model_checks import check_kernel, kernel_of
+from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.foundations import ElasticFoundation
@@ -294,7 +295,7 @@ def cut_out(
     mesh, spaces = body.mesh, {} if spaces is None else spaces
     used, local = np.unique(mesh.cells[cells], return_inverse=True)
     local = local.reshape(len(cells), -1).astype(np.int32)
-    key = blake2b(f"{body.cell_type} {body.components}".encode() + local.tobytes()).digest()
+    key = blake2b(f"{body.element.name} {body.components}".encode() + local.tobytes()).digest()
     several = expanded(local.astype(np.int64), len(used), mesh.dim)
     if key not in spaces:
         points = mesh.points[used]
@@ -365,7 +366,7 @@ def assemble(
         coordinates = places if absolute else _from_own_origin(places)
         _dolfinx.update_coordinates(mesh.space.mesh, coordinates)
         for thickness, on in _by_thickness(load, mesh, body, facets):
-            form = forms.load(load, parts, body.cell_type, mesh.space, places, on, acted, cells, of_cells)
+            form = forms.load(load, parts, body.element, mesh.space, places, on, acted, cells, of_cells)
             force += thickness * mesh.force_of(_dolfinx.assemble_vector(form))
     _check_finite(force, mesh)
     return replace(earlier, loads=acting, load=mesh.following.force(force))
@@ -435,14 +436,14 @@ def _with_stiffness(
     if twin is not None:
         kernel = kernel_of_body(body, points, parts.materials).reshape(mesh.size, -1)
         return replace(twin, mesh=mesh, loads=(), points=points, load=np.zeros(mesh.size), kernel=kernel)
-    space, cell_type = mesh.space, body.cell_type
+    space, element = mesh.space, body.element
     by_input_node = mesh.by_input_node(points)
     if not _varies(parts, body, forms):
         by_input_node = _from_own_origin(by_input_node)
 
     def stiffness() -> sp.csr_matrix:
         _dolfinx.update_coordinates(space.mesh, by_input_node)
-        indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(parts, cell_type, space))
+        indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(parts, element, space))
         elastic = mesh.matrix_of(sp.csr_matrix((data, indices, indptr)))
         if isinstance(body, ToolBody) and body.springs:
             return (elastic + sp.csr_matrix(body.spring_matrix(points))).tocsr()
@@ -475,7 +476,7 @@ def _depends_on_shape_alone(
 ) -> bool:
     """Return whether the stiffness depends on cells, numbering, materials and shape, but not on the place."""
     special = bool(beds) or isinstance(body, ToolBody)
-    return not (special or _dolfinx.is_revolved(body.cell_type) or _varies(parts, body, forms))
+    return body.kinematics.is_homogeneous and not (special or _varies(parts, body, forms))
 
 
 def foundation_of(mesh: SubdomainMesh, body: Body, foundations: Sequence[ElasticFoundation]) -> sp.csr_matrix:
@@ -489,7 +490,7 @@ def foundation_of(mesh: SubdomainMesh, body: Body, foundations: Sequence[Elastic
 
 def _varies(parts: Composition, body: Body, forms: FormLibrary) -> bool:
     """Return whether the materials of a mesh depend on position."""
-    return any(forms.varies(material, body.cell_type) for material in parts.materials)
+    return any(forms.varies(material, body.element) for material in parts.materials)
 
 
 def _from_own_origin(points: np.ndarray) -> np.ndarray:
@@ -504,13 +505,15 @@ def kernel_of_body(body: Body, points: np.ndarray, materials: Sequence[Material]
     """
     if isinstance(body, ToolBody):
         return body.kernel(points)
-    return common_kernel(body.materials if materials is None else materials, points, body.cell_type)
+    return common_kernel(body.materials if materials is None else materials, points, body.kinematics)
 
 
-def common_kernel(materials: Sequence[Material], points: np.ndarray, cell_type: str = "") -> np.ndarray:
+def common_kernel(
+    materials: Sequence[Material], points: np.ndarray, kinematics: Kinematics
+) -> np.ndarray:
     """Return the modes without energy of a body of several materials at points, (n, components, n_modes)."""
     # A motion without energy has none in any of the materials.
-    every = (kernel_of(material, points, cell_type) for material in materials)
+    every = (kernel_of(material, points, kinematics) for material in materials)
     return min(every, key=lambda modes: modes.shape[-1])
 
 

@@ -35,24 +35,3 @@ def motions_about(points: np.ndarray, centre: np.ndarray) -> np.ndarray:
     for axis in range(3):
         modes[:, :, 3 + axis] = np.cross(np.eye(3)[axis], arm)
     return modes
-
-
-def motions_of_revolution(points: np.ndarray, torsion: bool, radius: float | None = None) -> np.ndarray:
-    """Return the translation along the axis of bodies of revolution and, with torsion, the turn about it.
-
-    The turn is u_θ = r / R, of about the same size as the translation.
-
-    Args:
-        points: Coordinates r and z, shape (n, 2), [length].
-        torsion: Whether displacements have the component u_θ.
-        radius: R, [length]; by default the largest of the points.
-
-    Returns:
-        Modes, dimensionless: shape (n, 2, 1), with torsion (n, 3, 2).
-    """
-    modes = np.zeros((len(points), 3, 2) if torsion else (len(points), 2, 1))
-    modes[:, 1, 0] = 1.0
-    if torsion:
-        size = float(points[:, 0].max(initial=0.0)) if radius is None else radius
-        modes[:, 2, 1] = points[:, 0] / max(size, np.finfo(float).tiny)
-    return modes

@@ -243,10 +243,10 @@ def _modulus(state: State, pair: int) -> float:
         if isinstance(surface, Surface):
             body = scene.bodies[surface.body]
             remembers = isinstance(body.materials[0], HistoryMaterial)
-            if remembers or forms.varies(body.materials[0], body.mesh.cell_type):
+            if remembers or forms.varies(body.materials[0], body.element):
                 return float("nan")
             dim = scene.dim
-            own = moduli(forms, body.materials[0], body.mesh.cell_type)[:: dim + 1, :: dim + 1]
+            own = moduli(forms, body.materials[0], body.element)[:: dim + 1, :: dim + 1]
             along = np.trace(own) / dim
             across = (own.sum() - np.trace(own)) / (dim * (dim - 1))
             compliance += along / (along**2 - across**2)

@@ -15,17 +15,17 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import Composition, as_in_space, integrate
+from fenics_contact._fem.composition import Composition, integrate
 from fenics_contact._fem.forms import Temperature, stress_in_space, temperature_of
 from fenics_contact._fem.templates import (
     Constants,
     Template,
     Written,
-    per_revolution,
     quadrature_degree,
     scalar_constants,
     volume_measure,
 )
+from fenics_contact._kinematics.element import Element
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.initial_stress import initial_stress
@@ -134,12 +134,12 @@ class CellMeans:
         quantity: tuple[OfStress, int],
     ) -> None:
         """Compile the forms. Collective on ``comm``."""
-        cell_type = body.cell_type
+        element = body.element
         self._parts = _composition(mesh, body)
-        q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
+        q = ufl.TestFunction(element.cellwise())
         with together(comm):
             form, constants, coefficients = _weighted(
-                self._parts.materials, cell_type, q, temperature, quantity
+                self._parts.materials, element, q, temperature, quantity
             )
             stress = None
             if temperature.initial:
@@ -149,7 +149,7 @@ class CellMeans:
         self._form = Template(mesh.comm, form, constants, coefficients)
         self._numbers = temperature.numbers
         self._space = _dolfinx.scalar_space(mesh, 0)
-        volume = Template(mesh.comm, per_revolution(q, cell_type) * volume_measure(cell_type, 2), ())
+        volume = Template(mesh.comm, element.integrand(q) * volume_measure(element, 2), ())
         self._volume = _dolfinx.assemble_vector(volume.bind([self._space], ()))
 
     def of(self, displacement: _dolfinx.fem.Function, values: tuple[float, ...] = ()) -> np.ndarray:
@@ -243,22 +243,22 @@ def _weighted_sum(stress: Expr, weights: Constants) -> Expr:
 
 def _weighted(
     materials: tuple[Material, ...],
-    cell_type: str,
+    element: Element,
     q: Expr,
     temperature: Temperature,
     quantity: tuple[OfStress, int],
 ) -> Written:
     """Return ∫ of a quantity times q dx (a form), its constants and its coefficients."""
-    (u,) = _dolfinx.field_symbols(cell_type, 1)
-    (displacement,) = as_in_space(cell_type, u)
-    change, numbers, fields = temperature.write(cell_type)
+    (u,) = element.fields(1)
+    (displacement,) = element.in_space(u)
+    change, numbers, fields = temperature.write(element)
     of_stress, count = quantity
-    weights = scalar_constants(cell_type, count)
+    weights = scalar_constants(element, count)
 
     def density(material: Material, constants: tuple[ufl.Constant, ...]) -> Expr:
         return of_stress(stress_in_space(material, displacement, constants, change), weights) * q
 
-    form, constants = integrate(materials, cell_type, density, volume_measure(cell_type, 2))
+    form, constants = integrate(materials, element, density, volume_measure(element, 2))
     return form, (*weights, *numbers, *constants), [u, *fields]
 
 
@@ -397,8 +397,8 @@ def put_history_stress(
 
 def _means(body: Body, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return means over cells of values at Gauss points, (n_cells, n_gauss, ...) to (n_cells, ...)."""
-    weights, radii = _gauss_weights(body, cells)
-    weights = weights * radii if body.axisymmetric else weights
+    weights, first = _gauss_weights(body, cells)
+    weights = weights * body.kinematics.around(first)
     weights = weights / weights.sum(axis=1, keepdims=True)
     return np.einsum("cq,cq...->c...", weights, values)
 
@@ -406,7 +406,7 @@ def _means(body: Body, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _gauss_weights(body: Body, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return weights of the Gauss points in the plane or in space, and their first coordinates."""
     mesh, cell = body.mesh, CELL_TYPES[body.mesh.cell_type]
-    positions, weights = quadrature(cell, quadrature_degree(body.cell_type))
+    positions, weights = quadrature(cell, quadrature_degree(body.element))
     first = places_of(mesh.points, mesh.cells[cells])[..., 0] @ shape_values(cell, positions).T
     return weights * jacobians(mesh.points, mesh.cells[cells], positions), first
 
@@ -414,7 +414,7 @@ def _gauss_weights(body: Body, cells: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def _gauss_heights(body: Body, cells: np.ndarray) -> np.ndarray:
     """Return the second coordinates of the Gauss points of cells, shape (n_cells, n_gauss)."""
     mesh, cell = body.mesh, CELL_TYPES[body.mesh.cell_type]
-    positions, _ = quadrature(cell, quadrature_degree(body.cell_type))
+    positions, _ = quadrature(cell, quadrature_degree(body.element))
     return np.asarray(places_of(mesh.points, mesh.cells[cells])[..., 1] @ shape_values(cell, positions).T)
 
 

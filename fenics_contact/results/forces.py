@@ -131,7 +131,7 @@ def _resisted(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
         body = torn.scene.bodies[part.mesh.body]
         kernel, force = part.kernel.shape[1], np.zeros(part.mesh.size)
         if part.foundations:
-            kernel = common_kernel(part.material.materials, part.points, body.cell_type).shape[-1]
+            kernel = common_kernel(part.material.materials, part.points, body.kinematics).shape[-1]
         if kernel < body.motions:
             u = displacement[where]
             force = part.stiffness @ u - foundation_of(part.mesh, body, part.foundations) @ u

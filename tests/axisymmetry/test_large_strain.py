@@ -24,6 +24,8 @@ from fenics_contact import (
 from fenics_contact._fem.composition import Composition
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.mechanics import HistoryMechanics
+from fenics_contact._kinematics.element import Element
+from fenics_contact._kinematics.revolution import Revolution
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
 from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back, weight_derivatives
@@ -116,9 +118,8 @@ def test_tangent_of_metal_is_that_of_its_force(kind: Kind, metal: HistoryMateria
     mesh = section((1.0, 0.0), (3.0, 1.0), (2, 1), kind)
     own = _dolfinx.local_mesh(mesh.points, mesh.cells, mesh.cell_type)
     space = _dolfinx.coefficient(own, "u").function_space
-    mechanics = HistoryMechanics(
-        Composition((metal,)), _dolfinx.revolved(mesh.cell_type), space, mesh.points, None
-    )
+    element = Element(mesh.cell_type, Revolution())
+    mechanics = HistoryMechanics(Composition((metal,)), element, space, mesh.points, None)
     u = 0.05 * np.sin(1.7 * np.arange(mesh.points.size) ** 1.3)
     way = np.cos(np.arange(u.size) ** 1.5)
     ahead, behind = (mechanics.at(u + sign * 1e-6 * way).force for sign in (1, -1))
@@ -131,13 +132,13 @@ def test_force_of_metal_without_yield_is_that_of_the_linear_form() -> None:
     metal = J2Plasticity(10.0, 0.3, 1e6)
     own = _dolfinx.local_mesh(mesh.points, mesh.cells, mesh.cell_type)
     space = _dolfinx.coefficient(own, "u").function_space
-    cell_type = _dolfinx.revolved(mesh.cell_type)
-    mechanics = HistoryMechanics(Composition((metal,)), cell_type, space, mesh.points, None)
+    element = Element(mesh.cell_type, Revolution())
+    mechanics = HistoryMechanics(Composition((metal,)), element, space, mesh.points, None)
     scene = Scene({"disc": Body(mesh, metal, axisymmetric=True)})
     forms = FormLibrary(MPI.COMM_SELF)
     forms.prepare(scene)
     _dolfinx.update_coordinates(own, mesh.points)
-    indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(Composition((metal,)), cell_type, space))
+    indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(Composition((metal,)), element, space))
     stiffness = mechanics.at(np.zeros(mesh.points.size)).stiffness.toarray()
     expected = np.zeros_like(stiffness)
     expected[np.repeat(np.arange(len(expected)), np.diff(indptr)), indices] = data

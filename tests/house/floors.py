@@ -8,6 +8,7 @@ FLOORS = [
     {"_base", "theory"},
     {"_dolfinx", "_optimize", "qp", "shapes"},
     {"materials", "mesh"},
+    {"_kinematics"},
     {"_surfaces", "readers"},
     {"_scene", "gallery"},
     {"_fem", "_pairing"},

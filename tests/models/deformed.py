@@ -49,7 +49,7 @@ def patch_of(body: Body, forms: FormLibrary | None = None) -> Patch:
     points = body.mesh.points[mesh.nodes]
     parts = composition(body, mesh.cells)
     by_input_node = points[np.argsort(mesh.nodes)]
-    mechanics = forms.mechanics(parts, body.mesh.cell_type, mesh.space, by_input_node)
+    mechanics = forms.mechanics(parts, body.element, mesh.space, by_input_node)
     return Patch(body, mesh, points, forms, mechanics)
 
 

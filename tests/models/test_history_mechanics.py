@@ -136,7 +136,7 @@ def test_forces_are_in_equilibrium_and_turn_with_the_body() -> None:
     np.testing.assert_allclose(turned.stress, Q @ first.stress @ Q.T, atol=1e-9 * np.abs(first.stress).max())
     np.testing.assert_allclose(first.stress, first.stress.swapaxes(2, 3), atol=1e-12)
     deviator = first.stress - np.trace(first.stress, axis1=2, axis2=3)[..., None, None] / 3 * np.eye(3)
-    F = np.eye(3) + GaussPoints(patch.mesh.space, "hexahedron", patch.points).gradient(u.ravel())
+    F = np.eye(3) + GaussPoints(patch.mesh.space, patch.body.element, patch.points).gradient(u.ravel())
     equivalent = np.sqrt(1.5) * np.linalg.norm(deviator, axis=(2, 3)) * np.linalg.det(F)
     law = LARGE.yield_stress + LARGE.isotropic_hardening * first.history[..., 6]
     np.testing.assert_allclose(equivalent, law, rtol=1e-9)
@@ -178,7 +178,7 @@ def parts_of(body: Body, halves: np.ndarray, forms: FormLibrary) -> list[tuple[S
             mesh,
             forms.mechanics(
                 composition(body, mesh.cells),
-                body.mesh.cell_type,
+                body.element,
                 mesh.space,
                 body.mesh.points[np.sort(mesh.nodes)],
             ),

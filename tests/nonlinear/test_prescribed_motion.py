@@ -376,7 +376,7 @@ def test_stiffness_is_the_derivative_of_the_force_and_turns_with_the_body(cell: 
     acted = np.isin(mesh.nodes[order], body.mesh.surfaces["x1"])
     points = body.mesh.points[mesh.nodes]
     pressure = forms.following(
-        load, body.mesh.cell_type, mesh.space, points[order], mesh.facets_of(body, "x1"), acted
+        load, body.element, mesh.space, points[order], mesh.facets_of(body, "x1"), acted
     )
     u = smooth_field(points).ravel()
     direction = np.cos(np.arange(u.size) ** 1.5)

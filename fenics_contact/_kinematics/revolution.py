@@ -1,0 +1,187 @@
+"""Bodies of revolution: half a section (r, z), all around the axis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact._kinematics.base import Kinematics
+from fenics_contact._kinematics.gradients import Gradients
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cell_types import CELL_TYPES, cell_type_of, quadrature, shape_values
+from fenics_contact.mesh.collapsed import places_of
+from fenics_contact.mesh.faces import computed_rounding
+from fenics_contact.mesh.quality import jacobians
+
+if TYPE_CHECKING:
+    from fenics_contact._kinematics.element import Element
+
+
+@dataclass(frozen=True)
+class Revolution(Kinematics):
+    """Bodies of revolution, with the radius as first coordinate and the height along the axis as second.
+
+    Displacements are (u_r, u_z). Materials are those of space: the axes r, z and around the circumference
+    are x, y and z, and the gradient in space is [[u_r,r, u_r,z, 0], [u_z,r, u_z,z, 0], [0, 0, u_r / r]].
+    """
+
+    dim: int = 2
+
+    name = "axisymmetric"
+    least_degree = 2  # the hoop strain varies in linear triangles, too
+    is_homogeneous = False
+    can_rotate = False
+
+    @property
+    def motions(self) -> int:
+        """The translation along the axis."""
+        return 1
+
+    def around(self, first: Any) -> Any:
+        """Return the circumference."""
+        return 2 * np.pi * first
+
+    def integrand(self, density: Any, x: Any) -> Any:
+        """Return the density times the circumference."""
+        return self.around(x[0]) * density
+
+    def in_space(self, x: Any, fields: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return a displacement in space for each."""
+        import ufl  # plane and solid bodies go without
+
+        from fenics_contact._kinematics.stand_ins import stand_in
+
+        return tuple(
+            stand_in(
+                number,
+                ufl.as_vector([u[0], u[1], self._turn(u)]),
+                self._gradient_in_space(ufl.grad(u), u[0] / x[0], self._turn(u) / x[0]),
+            )
+            for number, u in enumerate(fields)
+        )
+
+    def of_gradient(self, energy: Callable[[Any], Any], gradient: Any, element: Element) -> Any:
+        """Return an energy density of a gradient; u_r / r and u_θ / r are as accurate, and left out."""
+        import ufl
+
+        from fenics_contact._kinematics.stand_ins import stand_in
+
+        strained = stand_in(0, ufl.as_vector([0, 0, 0]), self._gradient_in_space(gradient, 0.0, 0))
+        return self.on_cells(energy(strained), element.x)
+
+    def _turn(self, u: Any) -> Any:
+        """Return the displacement around the axis (UFL)."""
+        return 0
+
+    def _gradient_in_space(self, gradient: Any, hoop: Any, turn: Any) -> Any:
+        """Return the gradient in space (UFL) by u_r / r and u_θ / r."""
+        import ufl
+
+        return ufl.as_tensor(
+            [[gradient[0, 0], gradient[0, 1], 0], [gradient[1, 0], gradient[1, 1], 0], [0, 0, hoop]]
+        )
+
+    def on_cells(self, density: Any, x: Any) -> Any:
+        """Return what a material made of displacements in space."""
+        from fenics_contact._kinematics.stand_ins import replaced
+
+        return replaced(density, x)
+
+    def gradients(self, slopes: np.ndarray, values: np.ndarray, first: np.ndarray) -> Gradients:
+        """Return gradients with a hoop strain."""
+        return HoopGradients(slopes, values / first[..., None])
+
+    def unit_cell(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the nodes at radii around one."""
+        return nodes + np.array([0.5, 0.0])
+
+    def typical_size(self, points: np.ndarray) -> np.ndarray | float:
+        """Return the mean radius of cells, by the places of their nodes, (n_cells, nodes, 2)."""
+        return np.asarray(points[..., 0].mean(axis=1))
+
+    def volumes(self, points: np.ndarray, cells: np.ndarray, positions: np.ndarray) -> np.ndarray:
+        """Return volumes of a full revolution per area of the reference cell, (n_cells, m)."""
+        places = places_of(points, cells)
+        radii = places[..., 0] @ shape_values(cell_type_of(cells, 2), positions).T
+        return np.asarray(self.around(radii) * jacobians(points, cells, positions))
+
+    def volume(self, mesh: BodyMesh, cells: np.ndarray) -> float:
+        """Return the volume of a full revolution."""
+        cell = CELL_TYPES[mesh.cell_type]
+        positions, weights = quadrature(cell, 2 * cell.order)
+        return float((self.volumes(mesh.points, cells, positions) @ weights).sum())
+
+    def on_axis(self, points: np.ndarray) -> np.ndarray:
+        """Return which points of a body lie on its axis."""
+        return np.asarray(points[:, 0] <= computed_rounding(points))
+
+    def rigid_modes(self, points: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
+        """Return the translation along the axis, shape (n, 2, 1)."""
+        return self._modes(points if at is None else at, float(points[:, 0].max()))
+
+    def _modes(self, points: np.ndarray, radius: float) -> np.ndarray:
+        modes = np.zeros((len(points), self.components, self.motions))
+        modes[:, 1, 0] = 1.0
+        return modes
+
+    def kernel(self, of_material: Any, points: np.ndarray) -> np.ndarray:
+        """Return the rigid motions that the material does not resist."""
+        in_space = of_material(np.pad(points, ((0, 0), (0, 1)))).reshape(3 * len(points), -1)
+        modes = self._modes(points, float(points[:, 0].max(initial=0.0)))
+        moved = np.pad(modes, ((0, 0), (0, 3 - modes.shape[1]), (0, 0))).reshape(len(in_space), -1)
+        rest = moved - in_space @ np.linalg.lstsq(in_space, moved, rcond=None)[0]
+        return modes[..., np.abs(rest).max(axis=0) <= 1e-8]
+
+
+class HoopGradients(Gradients):
+    """Displacement gradients with the hoop strain u_r / r."""
+
+    def __init__(self, slopes: np.ndarray, hoop: np.ndarray) -> None:
+        """Keep the gradients of the shape functions, and these over the radius, (n_cells, n_gauss, nodes)."""
+        super().__init__(slopes)
+        self._hoop = hoop
+
+    def part(self, cells: np.ndarray) -> HoopGradients:
+        """Return those of some cells."""
+        return HoopGradients(self.slopes[cells], self._hoop[cells])
+
+    @property
+    def divergence(self) -> np.ndarray:
+        """Trace of the gradient for each unit nodal displacement."""
+        divergence = self.slopes.copy()
+        divergence[..., 0] += self._hoop
+        return divergence
+
+    def of(self, nodal: np.ndarray) -> np.ndarray:
+        """Return the gradient in three dimensions."""
+        gradient = super().of(nodal)
+        gradient[..., 2, 2] = np.einsum("cqa,ca->cq", self._hoop, nodal[..., 0])
+        return gradient
+
+    def contracted(self, tensors: np.ndarray) -> np.ndarray:
+        """Return T : ∇v for each unit nodal v."""
+        result = super().contracted(tensors)
+        result[..., 0] += tensors[..., 2, 2, None] * self._hoop
+        return result
+
+    def force(self, weights: np.ndarray, stress: np.ndarray) -> np.ndarray:
+        """Return ∫ P : ∇v."""
+        nodal = super().force(weights, stress)
+        nodal[..., 0] += np.einsum("cqa,cq->ca", self._hoop, weights * stress[..., 2, 2])
+        return nodal
+
+    def blocks(self, weights: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+        """Return ∫ ∇v : A : ∇u."""
+        G, N, each = self.slopes, self._hoop, weights[..., None, None]
+        by_hoop = (each * tangent[..., :2, :2, 2, 2]).swapaxes(2, 3)  # [j, i]
+        from_hoop = each * tangent[..., 2, 2, :2, :2]
+        n, _, nodes, dim = G.shape
+        blocks = np.zeros((n, nodes, dim, nodes, dim))
+        blocks[..., 0] += np.einsum("cqai,cqb->caib", G @ by_hoop, N)
+        blocks[:, :, 0] += np.einsum("cqa,cqbk->cabk", N, G @ from_hoop.swapaxes(2, 3))
+        both = weights * tangent[..., 2, 2, 2, 2]
+        blocks[:, :, 0, :, 0] += np.einsum("cqa,cq,cqb->cab", N, both, N)
+        return np.asarray(super().blocks(weights, tangent) + blocks)
