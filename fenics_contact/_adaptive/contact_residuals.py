@@ -52,8 +52,7 @@ class Places:
         along = np.einsum("nka,nkd->nad", slopes, surface.points[nodes])
         gram = np.einsum("nad,nbd->nab", along, along)
         area = np.tile(weights, len(facets)) * np.sqrt(np.linalg.det(gram))
-        if surface.axisymmetric:
-            area = 2.0 * np.pi * points[:, 0] * area
+        area = surface.measure.around(points[:, 0]) * area
         normal, _ = interpolated_normal(values, surface.normals[nodes])
         nothing, every = np.zeros(len(facet)), np.arange(len(facet))
         here = Projection(every, facet, local, nothing, normal, nothing, every[:0])

@@ -135,7 +135,7 @@ class GaussPoints:
         self._points, self._element = points, element
         jacobian = np.einsum("cai,qaj->cqij", points[self._cells], reference)
         kinematics, first = element.kinematics, points[self._cells, 0] @ self._values.T
-        self._weights = kinematics.around(first) * (weights * determinants(jacobian))
+        self._weights = kinematics.measure.around(first) * (weights * determinants(jacobian))
         self._gradients = kinematics.gradients(reference @ np.linalg.inv(jacobian), self._values, first)
 
     @property

@@ -167,7 +167,7 @@ def spread_traction(scene: Scene, load: TotalForce) -> Traction:
     revolution with torsion it is a + b r e_θ with b ∫ r² = M.
     """
     mesh = scene.bodies[load.body].mesh
-    surface = surface_moments(mesh.points, mesh.surfaces[load.surface], scene.axisymmetric)
+    surface = surface_moments(mesh.points, mesh.surfaces[load.surface], scene.kinematics.measure)
     thickness = thickness_on(scene.bodies[load.body], load.surface, "the surface of a TotalForce")
     if thickness != 1.0:
         given = None if load.moment is None else float(np.asarray(load.moment)) / thickness

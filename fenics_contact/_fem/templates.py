@@ -240,7 +240,7 @@ class CellPolynomials:
         jacobian = jacobians(points, cells, positions)
         self.weights = np.broadcast_to(jacobian, (len(cells), len(weights))) * weights
         places = shape_values(cell, positions) @ points[cells]
-        self.weights = element.kinematics.around(places[..., 0]) * self.weights
+        self.weights = element.kinematics.measure.around(places[..., 0]) * self.weights
         self.centres = np.einsum("cq,cqd->cd", self.weights, places) / self.weights.sum(axis=1)[:, None]
         linear = (places - self.centres[:, None])[..., : polynomial_size(element) - 1]
         self.values = np.concatenate([np.ones((*self.weights.shape, 1)), linear], axis=2)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from fenics_contact._kinematics.gradients import Gradients
+from fenics_contact._kinematics.measure import PLAIN, Measure
 from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.quality import cell_volumes, jacobians
@@ -29,6 +30,8 @@ class Kinematics:
 
     dim: int
 
+    #: How lengths, areas and volumes in coordinates are those of the body.
+    measure: ClassVar[Measure] = PLAIN
     #: What the names of forms have in addition to the type of cells.
     name = ""
     #: Least degree of the quadrature of stiffness on linear cells.
@@ -47,13 +50,6 @@ class Kinematics:
     def motions(self) -> int:
         """Number of rigid motions."""
         return 3 * (self.dim - 1)
-
-    def around(self, first: Any) -> Any:
-        """Return the length, area or volume per length, area or volume in coordinates, (...) or UFL.
-
-        `first`: first coordinates of points, [length].
-        """
-        return 1.0
 
     def integrand(self, density: Any, x: Any) -> Any:
         """Return what is integrated over cells or facets for a density (UFL) at x."""

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._kinematics.gradients import Gradients
+from fenics_contact._kinematics.measure import Measure
+from fenics_contact._kinematics.revolved_measure import RevolvedMeasure
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, cell_type_of, quadrature, shape_values
 from fenics_contact.mesh.collapsed import places_of
@@ -30,6 +32,7 @@ class Revolution(Kinematics):
 
     dim: int = 2
 
+    measure: ClassVar[Measure] = RevolvedMeasure()
     name = "axisymmetric"
     least_degree = 2  # the hoop strain varies in linear triangles, too
     is_homogeneous = False
@@ -40,13 +43,9 @@ class Revolution(Kinematics):
         """The translation along the axis."""
         return 1
 
-    def around(self, first: Any) -> Any:
-        """Return the circumference."""
-        return 2 * np.pi * first
-
     def integrand(self, density: Any, x: Any) -> Any:
         """Return the density times the circumference."""
-        return self.around(x[0]) * density
+        return self.measure.around(x[0]) * density
 
     def in_space(self, x: Any, fields: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return a displacement in space for each."""
@@ -106,7 +105,7 @@ class Revolution(Kinematics):
         """Return volumes of a full revolution per area of the reference cell, (n_cells, m)."""
         places = places_of(points, cells)
         radii = places[..., 0] @ shape_values(cell_type_of(cells, 2), positions).T
-        return np.asarray(self.around(radii) * jacobians(points, cells, positions))
+        return np.asarray(self.measure.around(radii) * jacobians(points, cells, positions))
 
     def volume(self, mesh: BodyMesh, cells: np.ndarray) -> float:
         """Return the volume of a full revolution."""

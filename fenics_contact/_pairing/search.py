@@ -603,5 +603,5 @@ def _points(
         np.zeros(count, dtype=np.int64), slave.nodes[chosen], weight, normal, tangent_frames(normal, axes),
         gap, slave.surface.point_areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)),
         axes, np.zeros(normal.shape, dtype=bool), gap, np.zeros(count, dtype=bool),
-        length=slave.surface.sizes[chosen] if slave.surface.axisymmetric else None,
+        length=slave.surface.sizes[chosen] if slave.surface.measure.varies else None,
     )  # fmt: skip

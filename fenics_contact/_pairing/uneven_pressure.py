@@ -57,7 +57,7 @@ def _areas(surface: FacetedSurface, places: np.ndarray, met: np.ndarray) -> tupl
     """
     facets = surface.bearing
     full = met[facets].all(axis=1)
-    bearing = bearing_areas(places, facets[full], surface.axisymmetric)
+    bearing = bearing_areas(places, facets[full], surface.measure)
     areas = np.bincount(facets[full].ravel(), bearing.ravel(), minlength=len(met))
     return ~np.isin(np.arange(len(met)), facets[~full]), areas
 

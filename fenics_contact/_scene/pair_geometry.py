@@ -97,12 +97,13 @@ def _resultant(scene: SceneParts, load: Load) -> np.ndarray | None:
     if isinstance(load, BodyForce):
         return value * body.volume_of(load.region)
     points, facets = body.mesh.points, body.mesh.surfaces[load.surface]
-    if isinstance(load, Pressure) and body.axisymmetric:
-        normals = sum(at.normals.sum(axis=0) for at in gauss_points(points, facets, True))
+    measure = body.kinematics.measure
+    if isinstance(load, Pressure) and measure.varies:
+        normals = sum(at.normals.sum(axis=0) for at in gauss_points(points, facets, measure))
         return np.asarray(-value * normals)
     if isinstance(load, Pressure):
         return np.asarray(-value * vector_areas(points, facets).sum(axis=0))
-    return value * float(quadrature_areas(points, facets, body.axisymmetric).sum())
+    return value * float(quadrature_areas(points, facets, measure).sum())
 
 
 def modulus_of(scene: SceneParts, pair: ContactPair) -> float | None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from fenics_contact._base.checks import checked
+from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.constraints import LinearConstraint
 from fenics_contact._scene.foundations import ElasticFoundation
@@ -329,6 +330,11 @@ class SceneParts:
         return next(iter(self.bodies.values())).components
 
     @property
+    def kinematics(self) -> Kinematics:
+        """The kinematics of its bodies, which are all alike."""
+        return next(iter(self.bodies.values())).kinematics
+
+    @property
     def torsion(self) -> bool:
         """Whether its bodies are bodies of revolution that may twist."""
         return next(iter(self.bodies.values())).torsion
@@ -584,7 +590,7 @@ def surface_of(
     body, marks = scene.bodies[surface.body], mirrored(scene, surface.body)
     found = true_surface(
         body.mesh, surface.name, geometry, mirrored=marks, planes=planes_of(scene), finer=finer,
-        axisymmetric=body.axisymmetric,
+        measure=body.kinematics.measure,
     )  # fmt: skip
     known = (geometry == "best" or finer) and surface.name in body.mesh.origin.shapes
     neighbours = () if known else _neighbours(scene, surface.body)
@@ -606,7 +612,7 @@ def slave_of(scene: SceneParts, pair: ContactPair | AnyTie, geometry: Geometry) 
 def as_mortar_slave(scene: SceneParts, side: Surface, surface: FacetedSurface) -> FacetedSurface:
     """Return a named surface as the slave of mortar contact: with areas of pieces, and its sharp nodes."""
     body = scene.bodies[side.body]
-    enough = facing_area(body.mesh, side.name, body.axisymmetric)
+    enough = facing_area(body.mesh, side.name, body.kinematics.measure)
     return replace(surface.with_areas_of_pieces(), sharp=np.where(sharp_at(scene, side), enough, np.inf))
 
 

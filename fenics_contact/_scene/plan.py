@@ -317,7 +317,7 @@ def _section_in_words(scene: SceneParts, preload: Preload) -> str:
     mesh = scene.bodies[preload.body].mesh
     facets, normal = preload.cut(mesh).facets, preload.normal(mesh)
     along = mesh.points[np.unique(facets)] @ normal
-    area = preload.area(mesh, scene.axisymmetric)
+    area = preload.area(mesh, scene.bodies[preload.body].kinematics.measure)
     cut = f"cut along {counted(len(facets), 'face')} of cells, area {area:.6g}"
     words = f"{preload.place}; {cut}"
     away = float(np.ptp(along))

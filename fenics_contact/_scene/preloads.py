@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
+from fenics_contact._kinematics.measure import PLAIN, Measure
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, Cut
 from fenics_contact.mesh.faces import vector_areas
@@ -184,12 +185,12 @@ class Preload:
         """Return the number of nodes on either side of the section, without centres that follow others."""
         return len(self.held_pairs(mesh))
 
-    def area(self, mesh: BodyMesh, axisymmetric: bool = False) -> float:
-        """Return the area of the section across its normal, [length^(dim - 1)], of a full revolution."""
+    def area(self, mesh: BodyMesh, measure: Measure = PLAIN) -> float:
+        """Return the area of the section across its normal, [length^(dim - 1)]."""
         facets = self.cut(mesh).facets
         areas = vector_areas(mesh.points, facets) @ self.normal(mesh)
         radius = mesh.points[facets[:, :2], 0].mean(axis=1)
-        return float((2.0 * np.pi * radius * areas if axisymmetric else areas).sum())
+        return float((measure.around(radius) * areas).sum())
 
 
 def cells_of_region(mesh: BodyMesh, body: str, name: str) -> np.ndarray:

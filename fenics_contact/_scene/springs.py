@@ -180,7 +180,7 @@ def mean_weights(scene: Around, surface: Surface) -> tuple[np.ndarray, np.ndarra
     facets = mesh.surfaces[surface.name]
     sums = np.zeros(mesh.n_nodes)
     for _, some in of_one_shape(facets):
-        np.add.at(sums, some, nodal_areas(mesh.points, some, scene.axisymmetric))
+        np.add.at(sums, some, nodal_areas(mesh.points, some, scene.bodies[surface.body].kinematics.measure))
     nodes = np.unique(facets)
     return nodes, sums[nodes] / sums.sum()
 
@@ -191,4 +191,5 @@ def _centre(scene: Around, end: Surface | GivenVector) -> np.ndarray:
     mesh = scene.bodies[end.body].mesh
     if end.name in mesh.node_sets:
         return np.asarray(mesh.points[mesh.node_sets[end.name]].mean(axis=0))
-    return surface_moments(mesh.points, mesh.surfaces[end.name], scene.axisymmetric).centroid
+    measure = scene.bodies[end.body].kinematics.measure
+    return surface_moments(mesh.points, mesh.surfaces[end.name], measure).centroid

@@ -6,6 +6,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from fenics_contact._kinematics.measure import Measure
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, nodal_areas
 from fenics_contact._surfaces.projection import Projection, project
 from fenics_contact._surfaces.true_surface import is_crease, joints_of
@@ -35,7 +36,7 @@ def sharp_nodes(mesh: BodyMesh, name: str, cuts: np.ndarray) -> np.ndarray:
     return known[key]
 
 
-def facing_area(mesh: BodyMesh, name: str, axisymmetric: bool, share: float = 0.05) -> np.ndarray:
+def facing_area(mesh: BodyMesh, name: str, measure: Measure, share: float = 0.05) -> np.ndarray:
     """Return the area of each node of a surface, ascending, that is enough to face a master, shape (n,).
 
     It is that of the mesh before any design moved it.
@@ -45,7 +46,7 @@ def facing_area(mesh: BodyMesh, name: str, axisymmetric: bool, share: float = 0.
     mesh = mesh.origin
     facets = linear_facets(mesh.linear.surfaces[name], mesh.dim).rows
     least = np.full(mesh.n_nodes, np.inf)
-    np.minimum.at(least, facets, nodal_areas(mesh.points, facets, axisymmetric))
+    np.minimum.at(least, facets, nodal_areas(mesh.points, facets, measure))
     return share * least[np.unique(facets)]
 
 

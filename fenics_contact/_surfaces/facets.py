@@ -15,29 +15,29 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._kinematics.measure import PLAIN, Measure
 from fenics_contact._surfaces.mixed_pieces import MixedPieces
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import FACET_TYPES, quadrature, shape_gradients, shape_values
-from fenics_contact.mesh.faces import computed_rounding, in_columns, is_triangle, narrowed, of_one_shape
+from fenics_contact.mesh.faces import in_columns, is_triangle, narrowed, of_one_shape
 
 
-def quadrature_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
+def quadrature_areas(points: np.ndarray, facets: np.ndarray, measure: Measure = PLAIN) -> np.ndarray:
     """Return the areas of facets, in the plane the lengths of edges.
 
     `points`: coordinates, shape (n_nodes, 3 or 2), [length]; `facets`: node numbers as in
-    `BodyMesh.surfaces`, shape (n_facets, nodes of a facet); `axisymmetric`: whether edges turn around the
-    axis where the first coordinate is zero; their areas are those of whole revolutions.
+    `BodyMesh.surfaces`, shape (n_facets, nodes of a facet); `measure`: what is an area.
 
     The result has shape (n_facets,), [length²] or [length].
     """
     areas = np.empty(len(facets))
     for numbers, some in of_one_shape(facets):
-        areas[numbers] = nodal_areas(points, some, axisymmetric).sum(axis=1)
+        areas[numbers] = nodal_areas(points, some, measure).sum(axis=1)
     return areas
 
 
-def nodal_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
+def nodal_areas(points: np.ndarray, facets: np.ndarray, measure: Measure = PLAIN) -> np.ndarray:
     """Integrate the shape functions over every facet: nodal forces of a unit pressure.
 
     Two Gauss points per direction on linear facets, three on quadratic ones.
@@ -45,7 +45,7 @@ def nodal_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = Fal
     The result has shape (n_facets, nodes of a facet), [length²] or [length].
     """
     total = np.zeros(facets.shape)
-    for at in gauss_points(points, facets, axisymmetric):
+    for at in gauss_points(points, facets, measure):
         total += at.areas[:, None] * at.values
     return total
 
@@ -65,17 +65,17 @@ class SurfaceMoments:
     second_moment: np.ndarray
 
 
-def surface_moments(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> SurfaceMoments:
+def surface_moments(points: np.ndarray, facets: np.ndarray, measure: Measure = PLAIN) -> SurfaceMoments:
     """Return area, centroid and second moments of a surface; arguments as of `quadrature_areas`."""
     origin = points[facets[0, 0]]  # moments are as exact far from the origin of coordinates as near it
     rule = [
         (at.areas, np.einsum("k,nkd->nd", at.values, points[some] - origin))
         for _, some in of_one_shape(facets)
-        for at in gauss_points(points, some, axisymmetric)
+        for at in gauss_points(points, some, measure)
     ]
     areas, places = np.concatenate([area for area, _ in rule]), np.concatenate([place for _, place in rule])
     area = float(areas.sum())
-    # A line on an axis of revolution has none: its middle is its centre.
+    # A line on an axis has none: its middle is its centre.
     centre = areas @ places / area if area > 0.0 else places.mean(axis=0)
     arms = places - centre
     return SurfaceMoments(area, origin + centre, (areas[:, None] * arms).T @ arms)
@@ -86,7 +86,7 @@ class GaussPoint:
     """One point of a quadrature rule in every facet.
 
     Attributes:
-        weight: Of the rule; on bodies of revolution times the circumference in every facet, (n_facets, 1).
+        weight: Of the rule, times `Measure.around` in every facet, a number or (n_facets, 1).
         values: Shape functions, shape (nodes of a facet,).
         gradients: Their derivatives by the reference coordinates, shape (nodes of a facet, dim − 1).
         tangents: Derivatives of the place by these, shape (n_facets, dim − 1, dim), [length].
@@ -115,7 +115,7 @@ class GaussPoint:
         return np.asarray(np.linalg.norm(self.normals, axis=1))
 
 
-def gauss_points(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> Iterator[GaussPoint]:
+def gauss_points(points: np.ndarray, facets: np.ndarray, measure: Measure = PLAIN) -> Iterator[GaussPoint]:
     """Return the points of a quadrature rule on facets, of one shape; others as of `quadrature_areas`."""
     assert not is_triangle(facets).any()
     kind = FACET_TYPES[facets.shape[1], points.shape[1]]
@@ -123,7 +123,7 @@ def gauss_points(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = Fa
     values, gradients = shape_values(kind, positions), shape_gradients(kind, positions)
     corners = points[facets]
     for weight, value, gradient in zip(weights, values, gradients, strict=True):
-        around = 2 * np.pi * (corners[..., 0] @ value)[:, None] if axisymmetric else 1.0
+        around = measure.around((corners[..., 0] @ value)[:, None])
         yield GaussPoint(float(weight) * around, value, gradient, np.einsum("ka,nkd->nad", gradient, corners))
 
 
@@ -136,12 +136,11 @@ def has_midside_pressure(facets: np.ndarray) -> bool:
     return facets.shape[1] == _MIDPOINTS.stop
 
 
-def bearing_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
+def bearing_areas(points: np.ndarray, facets: np.ndarray, measure: Measure = PLAIN) -> np.ndarray:
     """Return the area of each facet that bears on each of its nodes.
 
     It is the nodal force of a unit pressure, but that of the corners of quadratic triangles, which vanishes
-    on flat ones, is shared by their midpoints. On an axis of revolution the same holds of the ends of
-    quadratic edges.
+    on flat ones, is shared by their midpoints; see also `Measure.bearing`.
 
     The result has shape (n_facets, nodes of a facet), [length²] or [length].
     """
@@ -150,26 +149,11 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = F
         for numbers, some in of_one_shape(facets):
             result[numbers] = in_columns(bearing_areas(points, some), facets.shape[1])
         return result
-    areas = nodal_areas(points, facets, axisymmetric)
-    if axisymmetric and facets.shape[1] == 3:
-        ends = np.where(points[facets[:, :2], 0] <= computed_rounding(points), areas[:, :2], 0.0)
-        areas[:, :2] -= ends
-        areas[:, 2] += ends.sum(axis=1)
+    areas = measure.bearing(points, facets, nodal_areas(points, facets, measure))
     if has_midside_pressure(facets):
         areas[:, _MIDPOINTS] += areas[:, _CORNERS].mean(axis=1, keepdims=True)
         areas[:, _CORNERS] = 0.0
     return areas
-
-
-def ends_on_axis(points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ends of quadratic edges that lie on an axis of revolution, and their midpoints, (n,) each.
-
-    A uniform pressure makes no force at such an end, but a tip that presses there does.
-    """
-    if facets.shape[1] != 3 or points.shape[1] != 2:
-        return np.zeros((2, 0), dtype=np.int64)[0], np.zeros(0, dtype=np.int64)
-    facet, end = np.nonzero(points[facets[:, :2], 0] <= computed_rounding(points))
-    return facets[facet, end], facets[facet, 2]
 
 
 def bearing_pulled_back(by_areas: np.ndarray) -> np.ndarray:
@@ -194,23 +178,6 @@ def share_areas(mesh: BodyMesh, name: str) -> np.ndarray:
     if has_midside_pressure(facets) or is_triangle(facets).any():
         facets = mesh.linear.surfaces[name]
     return np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
-
-
-def filled_on_axis(facets: np.ndarray, values: np.ndarray, on_axis: np.ndarray) -> np.ndarray:
-    """Fill in values at ends of quadratic edges on an axis of revolution: those of an even parabola.
-
-    Larger values stay: a tip that presses there has no neighbour that does.
-
-    `facets`: node numbers, (n, nodes of a facet); values stay as they are unless there are three; `values`:
-    values at nodes, (n_nodes,) or (n_nodes, k); `on_axis`: marks of nodes, (n_nodes,).
-    """
-    result = values.copy()
-    if facets.shape[1] == 3:
-        for here, there in ((0, 1), (1, 0)):
-            edges = facets[on_axis[facets[:, here]]]
-            even = (4 * values[edges[:, 2]] - values[edges[:, there]]) / 3
-            result[edges[:, here]] = np.maximum(values[edges[:, here]], even)
-    return result
 
 
 def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -361,14 +328,13 @@ class FacetedSurface:
         points: Coordinates of the nodes, shape (n, dim), [length].
         averaged: Outward unit normals at the nodes, averaged over the facets around each, shape (n, dim).
         areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length]; zero
-            at the corners of quadratic triangles, on which a pressure does not bear. On bodies of revolution
-            that of the whole circumference.
+            at the corners of quadratic triangles, on which a pressure does not bear.
         mirrored: On which planes of symmetry the nodes lie, across which the normals have no component: a
             column for each plane, those normal to the axes first, shape (n, n_planes).
         relief: The true surface relative to the facets; None if it is unknown or coincides with them.
         whole: The facets that were cut into these, as rows of positions in ``nodes``, quadratic ones, or
             triangles and quadrilaterals together; None if they are whole.
-        axisymmetric: Whether it is that of a body of revolution, half of its section.
+        measure: What is a length or an area.
         planes: Unit normals of the planes of symmetry, shape (n_planes, dim); None: they are the axes.
         followed: What makes values at hanging nodes the means of their masters', shape (n, n); None without
             any.
@@ -388,7 +354,7 @@ class FacetedSurface:
     mirrored: np.ndarray
     relief: Relief | None = None
     whole: np.ndarray | None = None
-    axisymmetric: bool = False
+    measure: Measure = PLAIN
     planes: np.ndarray | None = None
     followed: sp.csr_matrix | None = None
     by_pieces: bool = False
@@ -444,16 +410,15 @@ class FacetedSurface:
         `points`: coordinates of the nodes, shape (n, dim), [length].
         """
         facets = self.bearing
-        if facets is self.facets and not self.axisymmetric:
+        if facets is self.facets and not self.measure.varies:
             return self.widths_at(points)
-        bearing = bearing_areas(points, facets, self.axisymmetric)
+        bearing = bearing_areas(points, facets, self.measure)
         return np.bincount(facets.ravel(), bearing.ravel(), minlength=len(points))
 
     def point_areas_at(self, points: np.ndarray) -> np.ndarray:
         """Return the areas of contact points where the nodes lie elsewhere, shape (n,).
 
-        The end of a quadratic edge on an axis of revolution, to which no area belongs, has that of the linear
-        piece beside it.
+        The end of a facet to which no area belongs has that of the linear piece beside it.
         """
         areas, (end, middle) = self.areas_at(points), self.discs
         if not len(end):
@@ -464,9 +429,8 @@ class FacetedSurface:
 
     @cached_property
     def discs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Its `ends_on_axis`; none by mortar, where the pieces have areas, and on other bodies."""
-        none = np.zeros(0, dtype=np.int64)
-        return ends_on_axis(self.points, self.bearing) if self.axisymmetric else (none, none)
+        """The ends of facets to which no area belongs; none by mortar, where the pieces have areas."""
+        return self.measure.ends(self.points, self.bearing)
 
     @property
     def point_areas(self) -> np.ndarray:
@@ -474,13 +438,13 @@ class FacetedSurface:
         return self.areas if not len(self.discs[0]) else self.point_areas_at(self.points)
 
     def widths_at(self, points: np.ndarray) -> np.ndarray:
-        """Return the area of linear facets around each node, on bodies of revolution the length of edges."""
+        """Return the area of linear facets around each node, in the plane the length of edges."""
         return _linear_areas(points, self.facets)
 
     @property
     def sizes(self) -> np.ndarray:
         """Size of the facets around each node, shape (n,), [length]."""
-        areas = self.widths_at(self.points) if self.axisymmetric else self.areas
+        areas = self.widths_at(self.points) if self.measure.varies else self.areas
         return np.asarray(areas ** (1.0 / (self.dim - 1)))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from fenics_contact._kinematics.measure import PLAIN, Measure
 from fenics_contact._surfaces.facets import (
     FacetedSurface,
     Relief,
@@ -351,7 +352,7 @@ def true_surface(
     mirrored: np.ndarray | None = None,
     planes: np.ndarray | None = None,
     finer: bool = False,
-    axisymmetric: bool = False,
+    measure: Measure = PLAIN,
 ) -> FacetedSurface:
     """Return a surface of a mesh with its normals and its relief: linear facets through its nodes.
 
@@ -361,7 +362,7 @@ def true_surface(
     """
     marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks, planes)
-    surface = _with_areas(surface, mesh, name, axisymmetric)
+    surface = _with_areas(surface, mesh, name, measure)
     if mesh.hanging:
         none = np.zeros(len(surface.nodes), dtype=bool)
         surface = replace(surface, followed=mesh.hanging.filled(surface.nodes, none))
@@ -378,11 +379,11 @@ def true_surface(
     return replace(surface, relief=known[key])
 
 
-def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str, axisymmetric: bool) -> FacetedSurface:
+def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str, measure: Measure) -> FacetedSurface:
     """Distribute the area of quadratic or turned facets over the nodes on which a uniform pressure bears."""
     facets = mesh.surfaces[name]
     both = has_both(facets)
-    if mesh.order == 1 and not (axisymmetric or both):
+    if mesh.order == 1 and not (measure.varies or both):
         return surface
     whole = np.searchsorted(surface.nodes, facets)
     if mesh.order > 1 or both:
@@ -390,7 +391,7 @@ def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str, axisymmetric
     if both:
         mixed = MixedPieces.of(surface.points, whole, linear_facets(facets, mesh.dim))
         surface = replace(surface, mixed=mixed)
-    surface = replace(surface, axisymmetric=axisymmetric)
+    surface = replace(surface, measure=measure)
     return replace(surface, areas=surface.areas_at(surface.points))
 
 

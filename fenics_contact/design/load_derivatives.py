@@ -107,7 +107,7 @@ def resultant_by_shape(torn: TornSystem, load: TotalForce, w: np.ndarray) -> np.
         def density(at: GaussPoint) -> tuple[np.ndarray, np.ndarray]:
             return spread.density(at.of(points, facets), at.of(field, facets))
 
-        result[numbers] = integral_pulled_back(points, facets, density, torn.scene.axisymmetric)
+        result[numbers] = integral_pulled_back(points, facets, density, torn.scene.kinematics.measure)
     return result
 
 
@@ -115,10 +115,10 @@ def _spread(
     torn: TornSystem, load: TotalForce, points: np.ndarray, facets: np.ndarray, field: np.ndarray
 ) -> _Spread:
     """Return the traction of a load and the coefficients of the moments, see the class."""
-    moments = surface_moments(points, facets, torn.scene.axisymmetric)
+    moments = surface_moments(points, facets, torn.scene.kinematics.measure)
     centre, force = (_in_space(vector[None])[0] for vector in (moments.centroid, np.array(load.value)))
     total, turned = np.zeros(3), np.zeros(3)  # W₀ and W₁
-    for at in gauss_points(points, facets, torn.scene.axisymmetric):
+    for at in gauss_points(points, facets, torn.scene.kinematics.measure):
         arm, w = _in_space(at.of(points, facets)) - centre, _in_space(at.of(field, facets))
         total += at.areas @ w
         turned += at.areas @ np.cross(arm, w)

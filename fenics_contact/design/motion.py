@@ -23,6 +23,7 @@ from fenics_contact._base.sparse import dispose_with
 from fenics_contact._fem.forms import temperature_of
 from fenics_contact._fem.templates import Template, volume_measure
 from fenics_contact._kinematics.element import Element, plain_element
+from fenics_contact._kinematics.measure import PLAIN, Measure
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.parts import mirrored, planes_of
@@ -275,19 +276,19 @@ def volume_of(scene: Scene, names: Sequence[str], numbers: NodeNumbers) -> tuple
     for name in names:
         body, mesh = scene.bodies[name], scene.bodies[name].mesh
         total += body.volume
-        own = volume_by_points(mesh, body.axisymmetric)
+        own = volume_by_points(mesh, body.kinematics.measure)
         by_points[numbers.global_nodes(name, np.arange(mesh.n_nodes))] = own
     return total, by_points
 
 
-def volume_by_points(mesh: BodyMesh, axisymmetric: bool = False) -> np.ndarray:
+def volume_by_points(mesh: BodyMesh, measure: Measure = PLAIN) -> np.ndarray:
     """Return the derivative of the volume by every node, shape (n_nodes, 3), [length²]; in 2D of the area.
 
     Moving the boundary by v changes the volume by ∫ v·n dA, so that only boundary nodes count.
     """
     faces, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
     result = np.zeros_like(mesh.points)
-    for at in gauss_points(mesh.points, faces, axisymmetric):
+    for at in gauss_points(mesh.points, faces, measure):
         np.add.at(result, faces, at.values[:, None] * at.normals[:, None])
     return result
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
+from fenics_contact._kinematics.measure import PLAIN, Measure
 from fenics_contact._pairing.points import reference_axes
 from fenics_contact._surfaces.facets import (
     FacetedSurface,
@@ -23,7 +23,7 @@ from fenics_contact._surfaces.facets import (
 )
 from fenics_contact._surfaces.pieces import shape_weight_gradients, shape_weights
 from fenics_contact._surfaces.projection import interpolated_normal, newton_matrix
-from fenics_contact.mesh.faces import computed_rounding, of_one_shape
+from fenics_contact.mesh.faces import of_one_shape
 
 
 def normals_pulled_back(
@@ -88,7 +88,7 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
     `by_areas`: derivative by each nodal area, shape (n,).
     """
     facets = surface.bearing
-    if facets is not surface.facets or surface.axisymmetric:
+    if facets is not surface.facets or surface.measure.varies:
         return sum(
             (_bearing_areas_pulled_back(surface, some, by_areas) for _, some in of_one_shape(facets)),
             start=np.zeros_like(surface.points),
@@ -121,12 +121,10 @@ def _bearing_areas_pulled_back(
     surface: FacetedSurface, facets: np.ndarray, by_areas: np.ndarray
 ) -> np.ndarray:
     """Return what whole facets of one shape have in `areas_pulled_back`, (n, dim)."""
-    by_nodal = bearing_pulled_back(by_areas[facets])
-    if surface.axisymmetric and facets.shape[1] == 3:
-        on_axis = surface.points[facets[:, :2], 0] <= computed_rounding(surface.points)
-        by_nodal[:, :2] = np.where(on_axis, by_nodal[:, 2:], by_nodal[:, :2])
+    by_bearing = bearing_pulled_back(by_areas[facets])
+    by_nodal = surface.measure.bearing_pulled_back(surface.points, facets, by_bearing)
     return integral_pulled_back(
-        surface.points, facets, lambda at: (by_nodal @ at.values, np.zeros((1, 1))), surface.axisymmetric
+        surface.points, facets, lambda at: (by_nodal @ at.values, np.zeros((1, 1))), surface.measure
     )
 
 
@@ -135,17 +133,15 @@ SurfaceDensity = Callable[[GaussPoint], tuple[np.ndarray, np.ndarray]]
 
 
 def integral_pulled_back(
-    points: np.ndarray, facets: np.ndarray, density: SurfaceDensity, axisymmetric: bool = False
+    points: np.ndarray, facets: np.ndarray, density: SurfaceDensity, measure: Measure = PLAIN
 ) -> np.ndarray:
     """Return the derivative of an integral over facets by the nodes, shape (n_nodes, dim).
 
-    `points`: coordinates, shape (n_nodes, dim), [length]; `axisymmetric`: whether it goes around an axis.
+    `points`: coordinates, shape (n_nodes, dim), [length]; `measure`: what is an area.
     """
-    if axisymmetric:
-        return integral_pulled_back(points, facets, partial(_around, points, facets, density))
     result = np.zeros_like(points)
     for at in gauss_points(points, facets):
-        value, by_place = density(at)
+        value, by_place = measure.density(*density(at), at.of(points, facets)[:, 0])
         unit = at.normals / at.areas[:, None]
         if points.shape[1] == 3:
             first, second = at.tangents[:, 0], at.tangents[:, 1]
@@ -156,16 +152,6 @@ def integral_pulled_back(
         by_corners = np.einsum("ka,nad->nkd", at.gradients, by_tangents)
         np.add.at(result, facets, by_corners + at.values[:, None] * (at.areas[:, None] * by_place)[:, None])
     return result
-
-
-def _around(
-    points: np.ndarray, facets: np.ndarray, density: SurfaceDensity, at: GaussPoint
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return a density times the circumference, and its derivative by the place."""
-    value, by_place = density(at)
-    radius = at.of(points, facets)[:, 0]
-    outwards = np.stack([value, np.zeros_like(value)], axis=1)
-    return 2 * np.pi * radius * value, 2 * np.pi * (radius[:, None] * by_place + outwards)
 
 
 def _products_pulled_back(surface: FacetedSurface, by_products: np.ndarray) -> np.ndarray:

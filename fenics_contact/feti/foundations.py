@@ -27,7 +27,9 @@ def foundation_stiffness(
     total = sp.csr_matrix((size, size))
     for foundation in foundations:
         facets = mesh.surfaces[foundation.surface]
-        area = quadrature_areas(mesh.points, facets, body.axisymmetric).sum() if foundation.total else 1.0
+        area = 1.0
+        if foundation.total:
+            area = quadrature_areas(mesh.points, facets, body.kinematics.measure).sum()
         if cells is not None:
             own, _ = boundary_faces(mesh.cells[cells], mesh.dim)
             facets = facets[match_faces(corners_of(facets, mesh.dim), corners_of(own, mesh.dim)) >= 0]
@@ -41,7 +43,7 @@ def _of_facets(foundation: ElasticFoundation, body: Body, facets: np.ndarray) ->
     mesh, stiffness = body.mesh, np.asarray(foundation.stiffness)
     dim, width = body.components, facets.shape[1]
     blocks = np.zeros((len(facets), width, dim, width, dim))
-    for at in gauss_points(mesh.points, facets, body.axisymmetric):
+    for at in gauss_points(mesh.points, facets, body.kinematics.measure):
         if stiffness.ndim:
             springs = at.areas[:, None, None] * np.diag(stiffness)
         else:

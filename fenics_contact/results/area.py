@@ -12,7 +12,7 @@ from fenics_contact._base.checks import GivenVector, naming_arguments, unit_vect
 from fenics_contact._scene.pair_geometry import modulus_of
 from fenics_contact._scene.pairs import Surface, pair_number
 from fenics_contact._scene.parts import surface_of
-from fenics_contact._surfaces.facets import filled_at_corners, filled_on_axis, nodal_areas
+from fenics_contact._surfaces.facets import filled_at_corners, nodal_areas
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.results.contact import Status
 from fenics_contact.results.state import State
@@ -199,7 +199,7 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
         spread = np.maximum(spread, 0.0)
     on_axis = scene.bodies[slave.body].on_axis[surface.nodes]
     if scene.axisymmetric and not by_mortar:
-        pressure = np.maximum(filled_on_axis(whole, pressure, on_axis), 0.0)
+        pressure = np.maximum(scene.kinematics.measure.filled(whole, pressure, on_axis), 0.0)
     places = surface.points
     if scene.bodies[slave.body].deforms_much:
         places = places + state.gather_displacement(slave.body)[surface.nodes]
@@ -209,7 +209,7 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
     facing = held.astype(float)
     facing[place] = 1.0
     if by_mortar:
-        areas = nodal_areas(surface.points, surface.facets, scene.axisymmetric).ravel()
+        areas = nodal_areas(surface.points, surface.facets, scene.kinematics.measure).ravel()
         of_nodes = fill.T @ np.bincount(surface.facets.ravel(), areas)
         whole_area = np.bincount(point, of_nodes[place], points.count)
         facing[place] = contact.nominal_area[point] / whole_area[point]
@@ -217,7 +217,7 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
     if not by_mortar:
         facing = np.maximum(filled_at_corners(whole, facing), 0.0)
     if scene.axisymmetric and not by_mortar:
-        facing = np.clip(filled_on_axis(whole, facing, on_axis), 0.0, 1.0)
+        facing = np.clip(scene.kinematics.measure.filled(whole, facing, on_axis), 0.0, 1.0)
     facets, beyond = surface.facets[:, : surface.corners], 0.0 if by_mortar else 0.5
     return _SlaveSurface(places, facets, pressure, spread, facing, given, beyond)
 

@@ -30,7 +30,7 @@ from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.initial_stress import initial_stress
 from fenics_contact._scene.scene import Scene
-from fenics_contact._surfaces.facets import filled_at_corners, filled_on_axis
+from fenics_contact._surfaces.facets import filled_at_corners
 from fenics_contact.errors import together
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.torn import TornSystem
@@ -324,8 +324,8 @@ def contact_fields(
                 field = mesh.hanging.filled_in(field, facets, nodes[own])
             filled_in = filled and not scene.contacts[pair].by_mortar
             field = filled_at_corners(facets, field) if filled_in else field
-            if filled_in and scene.axisymmetric and field.ndim == 1:  # slip is zero there
-                field = filled_on_axis(facets, field, scene.bodies[body].on_axis)
+            if filled_in and field.ndim == 1:  # slip is zero on an axis
+                field = scene.kinematics.measure.filled(facets, field, scene.bodies[body].on_axis)
             total += field
         return total
 
@@ -398,7 +398,7 @@ def put_history_stress(
 def _means(body: Body, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return means over cells of values at Gauss points, (n_cells, n_gauss, ...) to (n_cells, ...)."""
     weights, first = _gauss_weights(body, cells)
-    weights = weights * body.kinematics.around(first)
+    weights = weights * body.kinematics.measure.around(first)
     weights = weights / weights.sum(axis=1, keepdims=True)
     return np.einsum("cq,cq...->c...", weights, values)
 

@@ -489,7 +489,7 @@ def centroid(scene: Scene, surface: Surface) -> np.ndarray:
     mesh = scene.bodies[surface.body].mesh
     if surface.name in mesh.node_sets:
         return np.asarray(mesh.points[mesh.node_sets[surface.name]].mean(axis=0))
-    return surface_moments(mesh.points, mesh.surfaces[surface.name], scene.axisymmetric).centroid
+    return surface_moments(mesh.points, mesh.surfaces[surface.name], scene.kinematics.measure).centroid
 
 
 @tabled

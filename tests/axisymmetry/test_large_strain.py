@@ -26,6 +26,7 @@ from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.mechanics import HistoryMechanics
 from fenics_contact._kinematics.element import Element
 from fenics_contact._kinematics.revolution import Revolution
+from fenics_contact._kinematics.revolved_measure import RevolvedMeasure
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
 from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back, weight_derivatives
@@ -146,7 +147,7 @@ def test_force_of_metal_without_yield_is_that_of_the_linear_form() -> None:
 
 
 def turned(points: np.ndarray, facets: np.ndarray) -> FacetedSurface:
-    surface = replace(faceted_surface(points, facets), axisymmetric=True)
+    surface = replace(faceted_surface(points, facets), measure=RevolvedMeasure())
     return replace(surface, areas=surface.areas_at(surface.points))
 
 

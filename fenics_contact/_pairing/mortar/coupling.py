@@ -248,7 +248,7 @@ class MortarCoupling:
     Attributes:
         node: Positions in ``slave.nodes``, ascending, shape (n,).
         area: D_i = ∫ ψ_i = ∫ N_i over the part of the slave that faces the master, shape (n,), [length²] or
-            in plane problems [length]; of bodies of revolution all integrals go around the axis.
+            in plane problems [length].
         weight: M_ij / D_i with M_ij = ∫ ψ_i N_j, N_j of the master, shape (n, len(master.nodes)); rows add up
             to one.
         normal: Unit normal from master to slave, the averaged slave normal reversed, at corners of the slave
@@ -387,9 +387,8 @@ def _integrals(
     degree = degree_on(slave, master)
     for pair_slave, pair_master in chunks(*pairs):
         overlaps = overlaps_of(planes, pair_slave, pair_master, master, degree)
-        cells, at_slave, both = cells_of(overlaps), overlaps.slave, (chosen[overlaps.slave], overlaps.master)
-        if slave.axisymmetric:
-            cells = revolved(cells, slave, both[0])
+        at_slave, both = overlaps.slave, (chosen[overlaps.slave], overlaps.master)
+        cells = measured(cells_of(overlaps), slave, both[0])
         closer = relief_of_cells(cells, slave, master, both, planes.normal[at_slave])
         traces, basis = Traces.of(cells, (slave, master), both), DualBasis.on(cells)
         integrals = basis.integrals(np.concatenate([traces.functions, closer[:, :, None]], axis=2))
@@ -420,13 +419,13 @@ class Entries:
         return sparse.csr_matrix((values, (row, column)), shape=self.shape)
 
 
-def revolved(cells: Cells, slave: FacetedSurface, facet: np.ndarray) -> Cells:
-    """Return cells whose weights have the circumference 2 π r in them.
+def measured(cells: Cells, slave: FacetedSurface, facet: np.ndarray) -> Cells:
+    """Return cells whose weights are those of the slave's measure.
 
     `facet`: slave facet of each pair, shape (n_pairs,).
     """
-    radii = slave.points[slave.facets[facet[cells.pair]], 0]
-    return replace(cells, weight=2 * np.pi * cells.weight * np.einsum("nqk,nk->nq", cells.slave, radii))
+    first = slave.points[slave.facets[facet[cells.pair]], 0]
+    return replace(cells, weight=slave.measure.weights(cells.weight, cells.slave, first))
 
 
 def chunks(

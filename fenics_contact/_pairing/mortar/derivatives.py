@@ -27,8 +27,8 @@ from fenics_contact._pairing.mortar.coupling import (
     chunks,
     degree_on,
     inverted_pulled_back,
+    measured,
     relief_of_cells,
-    revolved,
 )
 from fenics_contact._pairing.mortar.jacobians import MomentSlopes, NumbersOver, SharedSlopes
 from fenics_contact._pairing.mortar.planes import Planes, SumsBy, planes_of, planes_pulled_back
@@ -399,9 +399,7 @@ def _cells_of_sums(
     of_pair, along = nodes[overlaps.facet], normal[overlaps.facet]
     by_raised = np.einsum("pkd,pd->pk", sums.relief[of_pair], along)
     felt, field = by_raised.any(axis=1)[cells.pair], np.zeros(cells.weight.shape)
-    plain = cells
-    if slave.axisymmetric:
-        cells = revolved(plain, slave, pairs[0])
+    plain, cells = cells, measured(cells, slave, pairs[0])
     basis, some, traces = DualBasis.on(cells), cells.part(felt), Traces.of(cells, surfaces, pairs)
     if felt.any():
         field[felt] = relief_of_cells(some, slave, master, pairs, along)
@@ -411,29 +409,29 @@ def _cells_of_sums(
     by = by.with_traces(traces.pulled_back(cells, surfaces, pairs, by_functions[:, :, :-1]))
     by_field = by_functions[:, :, -1]
     if not felt.any():
-        return _from_revolved(plain, slave, pairs[0], by, into[0].points), np.zeros(normal.shape)
+        return _from_measured(plain, slave, pairs[0], by, into[0].points), np.zeros(normal.shape)
     over_facets = SumsBy(overlaps.facet, len(facets))
     by_normal = over_facets((basis.integrals(field[:, :, None]) * sums.relief[of_pair]).sum(axis=1))
     more, by_along = relief_pulled_back(some, surfaces, pairs, along[some.pair], by_field[felt], into)
-    by = _from_revolved(plain, slave, pairs[0], by.grown(felt, more), into[0].points)
+    by = _from_measured(plain, slave, pairs[0], by.grown(felt, more), into[0].points)
     return by, by_normal + SumsBy(some.facet, len(facets))(by_along)
 
 
-def _from_revolved(
+def _from_measured(
     cells: Cells, slave: FacetedSurface, facet: np.ndarray, by: CellDerivatives, into: np.ndarray
 ) -> CellDerivatives:
     """Return the derivatives by plane cells; add those by radii to the slave's nodes, shape (n, dim)."""
-    if not slave.axisymmetric:
+    if not slave.measure.varies:
         return by
-    by, by_radii = revolved_pulled_back(cells, slave, facet, by)
+    by, by_radii = measured_pulled_back(cells, slave, facet, by)
     np.add.at(into[:, 0], slave.facets[facet], by_radii)
     return by
 
 
-def revolved_pulled_back(
+def measured_pulled_back(
     cells: Cells, slave: FacetedSurface, facet: np.ndarray, by: CellDerivatives
 ) -> tuple[CellDerivatives, np.ndarray]:
-    """Vector-Jacobian product of `revolved` with respect to the cells and the radii of the facets' corners.
+    """Vector-Jacobian product of `measured` with respect to the cells and the radii of the facets' corners.
 
     Derivatives by the cells, and by the radii of each pair's slave facet, shape (n_pairs, corners).
     """
@@ -560,7 +558,7 @@ def _of_facets(
     """Return the same of some overlaps that have all pairs of their slave facets, with repeated numbers."""
     both = chosen[overlaps.slave], overlaps.master
     plain = cells_of(overlaps)
-    cells = revolved(plain, slave, both[0]) if slave.axisymmetric else plain
+    cells = measured(plain, slave, both[0])
     traces, basis = Traces.of(cells, (slave, master), both), DualBasis.on(cells)
     n_slave, n_master = len(slave.nodes), len(master.nodes)
     functions = np.concatenate([traces.master, n_master + traces.slave], axis=1)

@@ -133,9 +133,9 @@ class MomentSlopes:
             trace_slopes(slave, here[pair], cells.local)[:, :, : traces.slave.shape[1]],
         )
         corners, opposite = slave.points[slave.facets[here]], master.points[master.facets[there]]
-        points = PointSlopes.of(overlaps, cells, corners[:, :, 0] if slave.axisymmetric else None)
-        own, revolved = planes.part(overlaps.slave), slave.axisymmetric
-        onto = corner_slopes(own, corners, opposite, revolved=revolved)
+        points = PointSlopes.of(overlaps, cells, corners[:, :, 0] if slave.measure.varies else None)
+        own, varies = planes.part(overlaps.slave), slave.measure.varies
+        onto = corner_slopes(own, corners, opposite, varies=varies)
         return cls.of(basis, points, traces, by_places).by_coordinates(onto)
 
     @classmethod
@@ -191,7 +191,7 @@ class MomentSlopes:
         return MomentSlopes(taken(self.area), taken(self.first), taken(self.second), taken(self.functions))
 
 
-def corner_slopes(planes: Planes, corners: np.ndarray, opposite: np.ndarray, *, revolved: bool) -> np.ndarray:
+def corner_slopes(planes: Planes, corners: np.ndarray, opposite: np.ndarray, *, varies: bool) -> np.ndarray:
     """Return the derivatives of flat coordinates of pairs, see `PointSlopes`, by the corners in space.
 
     `planes`: of the slave facet of each pair; `corners`: its corners, shape (n_pairs, corners, dim);
@@ -213,7 +213,7 @@ def corner_slopes(planes: Planes, corners: np.ndarray, opposite: np.ndarray, *, 
             planes, corners, own, np.zeros_like(planes.normal), (opposite, each, other)
         )
         rows.append(np.concatenate(sides, axis=1).reshape(count, -1))
-    if revolved:
+    if varies:
         radii = np.zeros((sizes[0], dim * sum(sizes)))
         radii[np.arange(sizes[0]), dim * np.arange(sizes[0])] = 1.0
         rows += [np.broadcast_to(row, (count, len(row))) for row in radii]
