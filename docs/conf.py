@@ -48,7 +48,9 @@ include_patterns = [
     "demos/demo_*.py",
     "notebooks/[0-9]*",
     "CHANGELOG.md",
+    "CODE_OF_CONDUCT.md",
     "CONTRIBUTING.md",
+    "SECURITY.md",
 ]
 exclude_patterns = [
     *(f"docs/{name}" for name in ("conf.py", "_site", "_static")),
