@@ -388,8 +388,8 @@ class ContactConfiguration:
             along = np.einsum("nad,npd->nap", points.tangents, points.tilted)
             across |= np.max(along**2, axis=2) > 0.5
         held = np.zeros_like(across)
-        held[torn.frictional] = (
-            torn.groups.slips.held(torn.decomposition.fixed).reshape(-1, torn.components - 1)
+        held[torn.frictional] = torn.groups.slips.held(torn.decomposition.fixed).reshape(
+            -1, torn.components - 1
         )
         return np.asarray(across & held)
 

@@ -156,9 +156,7 @@ def point_loads(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarray:
     return total
 
 
-def _of_point(
-    surface: RigidSurface, mesh: BodyMesh, modes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _of_point(surface: RigidSurface, mesh: BodyMesh, modes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return displacement and rotation of the point for motions of its body, and the units of both.
 
     Rotations count times the largest arm, see `RigidSurface.unit_modes`: shapes (n_components, n_modes) and

@@ -18,6 +18,7 @@ from fenics_contact.feti.row_groups import Glued, Joint, RowGroup, Unknowns
 if TYPE_CHECKING:
     from fenics_contact.qp.compliance import Compliance
 
+
 @dataclass(frozen=True, eq=False)
 class RowCompliance:
     """C(λ) of this rank's rows.

@@ -176,9 +176,7 @@ class ConstraintRows(Joint):
             values[own] = each.value
         return values
 
-    def check(
-        self, scene: Scene, prescribed: np.ndarray, moving: sp.csr_matrix, near: float = 1e-6
-    ) -> None:
+    def check(self, scene: Scene, prescribed: np.ndarray, moving: sp.csr_matrix, near: float = 1e-6) -> None:
         """Reject equations that contradict others or supports.
 
         `moving`: free motions of rigid surfaces on nodes, shape (n_nodes · components, n); `near`: of values,

@@ -212,7 +212,6 @@ class TangentialRows(Relations):
         size = np.einsum("rd,rd->r", normal, normal)
         return np.einsum("rd,rd->r", left, normal) / np.where(size > HELD**2, size, np.inf)
 
-
     @classmethod
     def of(
         cls,

@@ -68,9 +68,7 @@ class BondedPoints(JoinedPoints):
         return arms.reshape(-1, arms.shape[2]).T
 
 
-def bonded_rows(
-    points: ContactPoints, decomposition: Decomposition
-) -> tuple[np.ndarray, np.ndarray]:
+def bonded_rows(points: ContactPoints, decomposition: Decomposition) -> tuple[np.ndarray, np.ndarray]:
     """Return points and directions of rows along all components that supports leave free on the slaves."""
     which, component = np.nonzero(~decomposition.fixed[points.slave])
     along, axes = np.eye(points.normal.shape[1])[component], decomposition.axes

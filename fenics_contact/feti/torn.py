@@ -489,9 +489,7 @@ def _at_rest(
     )  # fmt: skip
 
 
-def _is_alike(
-    scene: Scene, decomposition: Decomposition, known: TornSystem, prescribed: np.ndarray
-) -> bool:
+def _is_alike(scene: Scene, decomposition: Decomposition, known: TornSystem, prescribed: np.ndarray) -> bool:
     """Return whether scenes have the same meshes, pairs and held components, and supports drive the same."""
     same = scene.has_meshes_of(known.scene) and known.decomposition is decomposition
     same = same and known.points.are_at_nodes and contacts_alike(scene, known.scene)

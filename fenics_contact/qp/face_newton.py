@@ -359,9 +359,7 @@ class _Run:
         exact_at = state.exact_at if iterate is newton.iterate else iterate.residuals.worst
         newton = replace(newton, iterate=iterate)
         least = state.seen(iterate)
-        state = replace(
-            state, newton=newton, history=history, answer=answer, exact_at=exact_at, least=least
-        )
+        state = replace(state, newton=newton, history=history, answer=answer, exact_at=exact_at, least=least)
         if answer is not None:
             return state
         lost = without_contact(history, self.parameters.patience)

@@ -33,9 +33,7 @@ def test_a_body_that_goes_with_the_pushed_one_is_named() -> None:
         loads=[Traction("upper", "z1", (0.0, 0.0, -1.0))],
         contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"))],
     )
-    words = (
-        r"body 'upper' can move away .* With it goes 'lower', which has no support of its own"
-    )
+    words = r"body 'upper' can move away .* With it goes 'lower', which has no support of its own"
     with pytest.raises(InfeasibleError, match=words):
         solve_scene(scene, MPI.COMM_SELF)
 

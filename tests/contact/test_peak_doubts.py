@@ -127,9 +127,7 @@ def test_one_point_that_a_bent_strip_presses_is_in_doubt() -> None:
     strip = Body(quadratic(rectangle((0.0, 0.0), (40.0, 1.0), (25, 2))), PlaneStrain(1e5, 0.0))
     tip, gap, at, stiffness = 0.234, 0.3, 38.8, 1e5 / 12.0
     pair = ContactPair(Surface("strip", "y1"), RigidSphere((at, 1.0 + gap + 2.0), 2.0))
-    scene = Scene(
-        {"strip": strip}, [Support("strip", "x0")], [Traction("strip", "x1", (0.0, tip))], [pair]
-    )
+    scene = Scene({"strip": strip}, [Support("strip", "x0")], [Traction("strip", "x1", (0.0, tip))], [pair])
     state = solve_scene(scene, MPI.COMM_SELF)
     assert isinstance(state, LinearState)
     free = tip * at**2 * (3.0 * 40.0 - at) / (6.0 * stiffness)

@@ -425,7 +425,7 @@ def test_scene_files_tighten_and_hold_bolts(tmp_path, capfd):
         ("preloads.screw", "preloads.bolt", "must be the name of a preload, one of 'screw'"),
         ("normal = [0.0, 0.0, 1.0]\n", "", "needs the point and normal of a plane, or two regions"),
         ("2.0]\n    normal", "9.0]\n    normal", "cuts through nothing"),
-        ('name = "screw"\n', "", "one of none, got \"screw\": give it name = \"screw\" there"),
+        ('name = "screw"\n', "", 'one of none, got "screw": give it name = "screw" there'),
     ],
 )
 def test_mistakes_in_scene_files_are_named(old, new, message):

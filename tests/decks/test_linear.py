@@ -322,9 +322,7 @@ def test_loads_out_of_the_plane_are_refused(element: str, load: str, tmp_path: P
         + "*DENSITY\n1.\n"
         + SECTION
     )
-    with pytest.raises(
-        DeckError, match=r"(CENTRIF|GRAV) here must be along (the axis|z|the plane)"
-    ):
+    with pytest.raises(DeckError, match=r"(CENTRIF|GRAV) here must be along (the axis|z|the plane)"):
         read_deck(deck(tmp_path, text + "*BOUNDARY\nBAR_Y0, 1, 2\n" + step(f"*DLOAD\nBAR, {load}\n")))
 
 

@@ -83,9 +83,7 @@ def ring(radius: float, width: float, count: int, dim: int) -> BodyMesh:
 
 
 @pytest.mark.parametrize(("dim", "element"), [(2, "CPE8"), (3, "C3D20R")])
-def test_nodes_in_the_middle_of_edges_count_for_the_distance(
-    dim: int, element: str, tmp_path: Path
-) -> None:
+def test_nodes_in_the_middle_of_edges_count_for_the_distance(dim: int, element: str, tmp_path: Path) -> None:
     """Round faces of four cells in a quarter: chords are off by 5 % of an edge, halves of them by 1.2 %."""
     meshes = {"IN": ring(1.0, 0.5, 4, dim), "OUT": ring(1.5, 0.5, 7, dim)}
     text = mesh_cards(meshes, element) + STEEL

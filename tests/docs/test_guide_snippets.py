@@ -18,10 +18,7 @@ PAGES = sorted(path.relative_to(ROOT) for path in FILES)
 #: Pages of many seconds, which claims rest on.
 LONG = ("clamp_hub", "large_deformations", "not_converging", "shape_optimisation", "valve_deck")
 MARKS = {page: [pytest.mark.slow, pytest.mark.claim] for page in LONG}
-MARKED = [
-    pytest.param(page, marks=[*MARKS.get(page.stem, ())], id=page.stem)
-    for page in PAGES
-]
+MARKED = [pytest.param(page, marks=[*MARKS.get(page.stem, ())], id=page.stem) for page in PAGES]
 
 
 def run(snippet: Snippet, names: dict[str, object], page: Path) -> str:

@@ -130,7 +130,7 @@ def test_the_recipe_asks_for_what_the_package_needs() -> None:
     needed |= {each.module: each.oldest for each in others} | {"dolfinx": asked["fenics-dolfinx"]}
     assert len(needed) > 10
     assert asked == {CONDA.get(name, name): version for name, version in needed.items()}
-    assert f'\n  version: {project["version"]}\n' in recipe
+    assert f"\n  version: {project['version']}\n" in recipe
     assert f'python_min: "{project["requires-python"].removeprefix(">=")}"' in recipe
     assert "petsc * real*" in run
     assert f"{project['scripts'].popitem()[1]}\n" in recipe

@@ -24,7 +24,7 @@ def test_nothing_that_makes_the_house_hard_to_live_in_grows(
     assert grown(now, record()[title]) == {}, REMEDY
 
 
-SAMPLE = '''
+SAMPLE = """
 from dataclasses import dataclass
 @dataclass(frozen=True)
 class Spring:
@@ -39,7 +39,7 @@ class Spring:
                 "none"
             )
         return {id(a): 1}
-'''
+"""
 
 
 def test_each_kind_is_counted(tmp_path: Path) -> None:

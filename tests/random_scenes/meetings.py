@@ -235,11 +235,14 @@ def _contact(dice: Dice, meshes: dict[str, BodyMesh]) -> Part:
         if law == "tied":
             return {"ties": [Tie(slave, master)]}
         friction: Friction = {
-            "none": None, "Coulomb": Coulomb(level), "Tresca": Tresca(0.02 * level * writing.stress),
+            "none": None,
+            "Coulomb": Coulomb(level),
+            "Tresca": Tresca(0.02 * level * writing.stress),
         }[law]  # type: ignore[assignment]
         stress, length = writing.stress, writing.length
         soft: ClosureLaw | None = {
-            "exact": None, "linear": LinearClosure(stress / length),
+            "exact": None,
+            "linear": LinearClosure(stress / length),
             "exponential": ExponentialClosure(0.01 * stress, 0.01 * length),
             "table": ClosureTable((-0.01 * length, 0.0, 0.01 * length), (0.0, 0.005 * stress, 0.02 * stress)),
         }[closure]

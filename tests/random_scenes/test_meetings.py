@@ -51,9 +51,7 @@ def test_a_writing_turns_and_mirrors_rotations() -> None:
 
 
 @pytest.mark.parametrize(("factor", "wrong"), [(1.0 + 1e-3, True), (1.0, False)])
-def test_answers_that_differ_are_noticed(
-    factor: float, wrong: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_answers_that_differ_are_noticed(factor: float, wrong: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     force: Callable[[ContactResult], np.ndarray] = ContactResult.force.fget  # type: ignore[attr-defined]
     calls: list[ContactResult] = []
 

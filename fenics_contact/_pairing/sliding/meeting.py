@@ -144,9 +144,7 @@ def meetings_of(
         _require_inside(scene)
     number = slave = np.zeros(0, dtype=np.int64)
     if scene.contacts and scene.ties:
-        points, ties = (
-            find(scene, fixed, comm) for find in (find_contact_points, find_tied_points)
-        )
+        points, ties = (find(scene, fixed, comm) for find in (find_contact_points, find_tied_points))
         number, slave = tied_keys(points, ties, scene, fixed, axes)
     with together(comm):
         meetings = tuple(
