@@ -113,8 +113,9 @@ studies: $(prepare) ## Measure what accuracy costs in time; results in docs/stud
 	  --output docs/studies/$$study --runs output/studies/$$study || exit 1; done
 	$(python) -m benchmarks.studies_page docs/studies
 
-lint: $(prepare) ## Check style (ruff) and types (mypy)
+lint: $(prepare) ## Check style and format (ruff) and types (mypy)
 	$(python) -m ruff check .
+	$(python) -m ruff format --check --quiet .
 	$(python) -m mypy
 
 setup-demo: ## Install what the package and its demos need: packages of the system and .venv
