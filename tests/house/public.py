@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -24,6 +25,13 @@ FOLDERS = (
 
 def texts() -> dict[Path, str]:
     return {path: path.read_text() for pattern in FOLDERS for path in sorted(ROOT.glob(pattern))}
+
+
+def code_of(path: Path, text: str) -> str:
+    """Return a script as it is, and of a page what is set as code: fences and words between backticks."""
+    if path.suffix != ".md":
+        return text
+    return "\n".join(re.findall(r"^```.*?^```|`[^`\n]+`", text, re.DOTALL | re.MULTILINE))
 
 
 def rooms() -> list[ModuleType]:

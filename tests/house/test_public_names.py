@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import inspect
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import fenics_contact
 from tests.conftest import ROOT, launch
-from tests.house.public import public, rooms, texts
+from tests.house.public import code_of, public, rooms, texts
 
 #: Import lines that a script of a user needs at most.
 MOST_IMPORTS = 4
@@ -45,6 +46,18 @@ def test_every_public_name_is_met_somewhere() -> None:
     assert len(names) > 200, "no names were found: nothing was tested"
     assert unmet(names, " ".join(texts().values())) == []
     assert unmet({"lost": unmet, "found": rooms}, "found") == ["lost"]
+
+
+def test_every_public_name_is_in_the_code_of_a_demo_a_notebook_or_a_page() -> None:
+    words = set(re.findall(r"\w+", " ".join(code_of(path, text) for path, text in texts().items())))
+    names = [name.rpartition(".")[2] for name in public()]
+    assert sorted(set(names) - words) == []
+
+
+def test_code_of_a_page_is_what_is_set_as_code() -> None:
+    page = "# Balance\n`state.tools()` of\n```python\nfound = 1\n```\na resultant\n"
+    assert re.findall(r"\w+", code_of(Path("a.md"), page)) == ["state", "tools", "python", "found", "1"]
+    assert code_of(Path("a.py"), page) == page
 
 
 def test_a_public_name_has_one_place() -> None:
