@@ -59,11 +59,10 @@ test: lint ## Check style and types, run the quick tests and the quick benchmark
 	$(quick)
 	$(python) -m benchmarks --quick
 
-core := tests/dolfinx tests/contact/test_patch.py tests/contact/test_coulomb.py tests/contact/test_hertz.py \
-  tests/contact/test_quadratic_cells.py tests/contact/test_ranks.py tests/shape/test_adjoint.py \
-  tests/shape/test_derivatives.py tests/models/test_hyperelasticity.py tests/nonlinear/test_sliding.py \
-  tests/mesh_io/test_dolfinx_import.py tests/mesh_io/test_meshio_import.py tests/mesh_io/test_gmsh_import.py \
-  tests/house/test_starting.py
+core := tests/dolfinx $(addprefix tests/equilibrium/test_, patch.py coulomb.py hertz.py quadratic_cells.py ranks.py) \
+  tests/design/test_adjoint.py tests/design/test_derivatives.py tests/materials/test_hyperelasticity.py \
+  tests/large_deformations/test_sliding.py $(addprefix tests/readers/test_, dolfinx_import.py meshio_import.py \
+  gmsh_import.py) tests/house/test_starting.py
 
 test-core: $(prepare) ## Run the most telling tests: patches, Coulomb, derivatives, large deformations, meshes, ranks
 	$(quick) $(core)

@@ -33,8 +33,8 @@ from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual
-from tests.contact import effect_cases, gallery
-from tests.contact.gallery import FLOOR, SOFT
+from tests.equilibrium import effect_cases, gallery
+from tests.equilibrium.gallery import FLOOR, SOFT
 
 Cut = Callable[[Scene], Mapping[str, np.ndarray]]
 

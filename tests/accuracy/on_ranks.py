@@ -15,7 +15,7 @@ from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.mesh import bisection_partition
 from tests.accuracy.fields import quadratic, torn_field
-from tests.models.bodies import bent, box, in_halves
+from tests.materials.bodies import bent, box, in_halves
 
 SOFT, STIFF = IsotropicElasticity(100.0, 0.3), IsotropicElasticity(300.0, 0.2)
 

@@ -25,8 +25,8 @@ from fenics_contact.qp import DualProblem, DualSolution, FaceNewton, Start
 from fenics_contact.results import BalancedTolerance, SolverErrors
 from fenics_contact.results.deformed_state import AnyState
 from tests.accuracy.algebraic import CASES, measured
-from tests.contact import effect_cases, gallery
-from tests.contact.gallery import SOFT
+from tests.equilibrium import effect_cases, gallery
+from tests.equilibrium.gallery import SOFT
 
 PAIR = "a body that friction holds"
 MODEST = ["a linear block", "a ball on a plane", "Tresca's law", PAIR, "a mortar pair", "two dimensions"]

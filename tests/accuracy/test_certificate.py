@@ -36,7 +36,7 @@ from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual
 from tests.accuracy.algebraic import CASES, Measured, clamped, energy_norm, measured, solved
-from tests.contact import gallery
+from tests.equilibrium import gallery
 
 
 def assert_certified(found: Measured, factor: float = 10.0) -> None:

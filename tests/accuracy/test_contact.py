@@ -41,7 +41,7 @@ from tests.accuracy.nested import Lines, Solved, bisected, refined, true_errors
 YOUNG, POISSON = 1000.0, 0.3
 #: Of Hertz: the rigid disc or ball, and how far the lower side of the body is lifted against it.
 RADIUS, LIFT = 50.0, 0.05
-#: Of Cattaneo and Mindlin, as in tests/contact/test_hertz.py.
+#: Of Cattaneo and Mindlin, as in tests/equilibrium/test_hertz.py.
 FRICTION, CURVED, SIZE, PRESS, SHEAR = 0.4, 2000.0, 30.0, 0.00205, 0.000735
 
 

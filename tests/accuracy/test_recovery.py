@@ -42,9 +42,9 @@ from tests.accuracy.fields import (
 )
 from tests.accuracy.smooth import PLANE as SMOOTH_PLANE
 from tests.accuracy.smooth import Found, mesh_of, solved
-from tests.models.bodies import bent, box, in_halves
-from tests.models.elements import CELLS, PLANE
-from tests.models.materials import LAME, EnergyByEntries, Foundation, FromEnergy, FromStress
+from tests.materials.bodies import bent, box, in_halves
+from tests.materials.elements import CELLS, PLANE
+from tests.materials.materials import LAME, EnergyByEntries, Foundation, FromEnergy, FromStress
 
 MESHES: dict[str, Callable[[], BodyMesh]] = {
     **{f"bent {cell}": lambda cell=cell: bent(box(cell, (4, 3, 3))) for cell in CELLS},

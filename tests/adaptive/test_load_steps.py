@@ -39,7 +39,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials import FinitePlasticity, J2Plasticity, NeoHooke
 from fenics_contact.mesh import MeshTransfer, refined
 from tests.adaptive.rolling import RADIUS, block, forces, pressed, rolled, upwards
-from tests.contact.nested_cases import SCENES, cut, outside, refined_near
+from tests.equilibrium.nested_cases import SCENES, cut, outside, refined_near
 
 SELF = MPI.COMM_SELF
 STEEL = J2Plasticity(200.0, 0.3, 0.2, 2.0, 10.0)

@@ -12,14 +12,14 @@ from mpi4py import MPI
 from fenics_contact import LinearState, Scene, ToolMotion, solve_nested, solve_scene
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.materials import NeoHooke
-from tests.contact.nested_cases import disc_on_block, two_plates
-from tests.contact.tooling import STRAIGHT, pressed
+from tests.equilibrium.nested_cases import disc_on_block, two_plates
+from tests.equilibrium.tooling import STRAIGHT, pressed
 
 SELF = MPI.COMM_SELF
 RANKS = """
 from mpi4py import MPI
 from fenics_contact import solve_nested
-from tests.contact.nested_cases import disc_on_block
+from tests.equilibrium.nested_cases import disc_on_block
 states = []
 state = solve_nested(disc_on_block(cells=2), 2, MPI.COMM_WORLD, tolerance=1e-8, callback=states.append)
 if MPI.COMM_WORLD.rank == 0:

@@ -30,12 +30,12 @@ from fenics_contact.design import ContactArea, Movement, PressureNorm
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.mesh import quadratic
-from tests.contact.gallery import crowned
-from tests.shape.aims import aims
-from tests.shape.deformed_blocks import design_problem, pressed
-from tests.shape.objectives import objectives
-from tests.shape.plane_blocks import line_of
-from tests.shape.quotients import Line, check_adjoint
+from tests.design.aims import aims
+from tests.design.deformed_blocks import design_problem, pressed
+from tests.design.objectives import objectives
+from tests.design.plane_blocks import line_of
+from tests.design.quotients import Line, check_adjoint
+from tests.equilibrium.gallery import crowned
 
 RUBBER, PLASTIC = IsotropicElasticity(100.0, 0.3, 1e-3), IsotropicElasticity(300.0, 0.2, 1e-3)
 OBJECTIVES = {**objectives("block"), **aims("block", "y0", 2)}

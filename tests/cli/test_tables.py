@@ -6,8 +6,8 @@ from fenics_contact._cli.console import forces_table, state_facts
 from fenics_contact._scene_file.document import UnitNames
 from fenics_contact.output.result import forces_record
 from fenics_contact.output.tables import step_row
-from tests.viz.plane_states import flat_pad
-from tests.viz.states import touching_blocks
+from tests.pictures.plane_states import flat_pad
+from tests.pictures.states import touching_blocks
 
 
 def test_forces_and_energies_have_the_units_of_their_dimension() -> None:

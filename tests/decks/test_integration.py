@@ -12,7 +12,7 @@ from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import quadratic, serendipity
 from tests.decks.texts import STEEL, deck, mesh_cards
-from tests.linear.columns import COLUMN
+from tests.fem.columns import COLUMN
 
 SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
 SOFT = STEEL.replace("210000.", "1000.")

@@ -14,7 +14,7 @@ from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStress
 from fenics_contact.mesh import joined_cells, quadratic, refined
 from tests.decks.texts import BAR, END, FREE_TO_CONTRACT, PULLED, SECTION, STEEL, deck, mesh_cards, step
-from tests.linear.mixed_cells import named_sides
+from tests.fem.mixed_cells import named_sides
 
 
 def displacement(found: Deck, body: str = "BAR", number: int = -1) -> np.ndarray:

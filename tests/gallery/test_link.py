@@ -20,7 +20,7 @@ from fenics_contact.mesh import boundary_faces, scaled_jacobian
 from fenics_contact.mesh.faces import vector_areas
 from fenics_contact.mesh.partition import check_face_connected
 from fenics_contact.mesh.quality import jacobians
-from tests.partition.counts import torn_node_counts
+from tests.mesh.counts import torn_node_counts
 
 CELLS = ["hexahedron", "tetrahedron"]
 

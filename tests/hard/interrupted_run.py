@@ -10,8 +10,8 @@ from typing import Any
 from mpi4py import MPI
 
 from fenics_contact import Checkpoint
-from tests.contact.step_cases import sequence, shears
-from tests.shape.resumed_cases import minimised, posed
+from tests.design.resumed_cases import minimised, posed
+from tests.equilibrium.step_cases import sequence, shears
 
 
 def optimisation(path: Path | None) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.feti.decomposition import prescribed_displacements
 from fenics_contact.materials import rigid_body_modes
 from fenics_contact.results.deformed_state import AnyState
-from tests.contact.checks import residuals
+from tests.equilibrium.checks import residuals
 
 
 class Whole:

@@ -24,10 +24,10 @@ from fenics_contact.design import AdaptiveTolerance, ContactForces, TotalPotenti
 from fenics_contact.gallery import block
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results import ContactResult
-from tests.contact.gallery import FLOOR, crowned, partitions
-from tests.shape.blocks import PLASTIC, RUBBER, designs_of, side
-from tests.shape.objectives import normal_forces
-from tests.shape.pressed import DESIGN, SWITCHES
+from tests.design.blocks import PLASTIC, RUBBER, designs_of, side
+from tests.design.objectives import normal_forces
+from tests.design.pressed import DESIGN, SWITCHES
+from tests.equilibrium.gallery import FLOOR, crowned, partitions
 
 Array = np.ndarray
 

@@ -24,7 +24,7 @@ from tests.hard.interrupted_run import RUNS
 from tests.optimize.cases import BY_NAME
 
 GROUP = "interrupted"
-CHECKPOINTS = ROOT / "tests" / "checkpoint"
+CHECKPOINTS = ROOT / "tests" / "base"
 #: How long a run may take until it has written once more.
 PATIENCE = 120.0
 

@@ -13,12 +13,12 @@ from fenics_contact._optimize.result import StepKind
 from fenics_contact.design import AdaptiveTolerance, BundleTrust, DesignPoint, Result
 from fenics_contact.errors import InvalidDesignError
 from fenics_contact.qp import FaceNewton
+from tests.design.pressed import DESIGN
+from tests.design.resumed_cases import BOUND, minimised, posed
 from tests.hard.conftest import Record
 from tests.hard.invariants import violations
 from tests.hard.shapes import carved, kink, on_a_ramp, thick
 from tests.hard.trial import scene_size, statuses
-from tests.shape.pressed import DESIGN
-from tests.shape.resumed_cases import BOUND, minimised, posed
 
 GROUP = "optimisation"
 #: A slope of one, and how far the ends of the ramp may move.

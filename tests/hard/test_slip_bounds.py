@@ -9,7 +9,7 @@ from mpi4py import MPI
 from fenics_contact import FixedPoint, Tresca
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse, solve
-from tests.contact.gallery import partitions, pressed_block
+from tests.equilibrium.gallery import partitions, pressed_block
 from tests.hard.conftest import Record
 from tests.hard.trial import TOLERANCE, fallbacks
 

@@ -141,9 +141,9 @@ from fenics_contact.results import (
     UnheldMotion,
 )
 from fenics_contact.results.deformed_state import AnyState
-from tests.contact.gallery import partitions
-from tests.nonlinear.scenes import pressed, rounded
-from tests.shape.blocks import block_on_floor, designs_of
+from tests.design.blocks import block_on_floor, designs_of
+from tests.equilibrium.gallery import partitions
+from tests.large_deformations.scenes import pressed, rounded
 
 FACES = ("materials", "mesh", "results", "design")
 MOST_PRINTED = 25

@@ -130,7 +130,7 @@ def test_processes_forked_after_a_solve_refuse_to_compute(mpirun: Callable[..., 
     from fenics_contact import ContactProblem
     from fenics_contact import Tresca
     from tests.house.pressed_block import solve
-    from tests.shape.blocks import block_on_block, problem
+    from tests.design.blocks import block_on_block, problem
 
     state = solve(MPI.COMM_SELF)
     design = problem(block_on_block(Tresca(0.8), load=(0.6, 0.12, -2.0)))

@@ -10,7 +10,7 @@ from fenics_contact.mesh import boundary_faces, joined_cells, quadratic, scaled_
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import SHAPES, by_shape, collapse, places_of
 from fenics_contact.mesh.faces import neighbours, vector_areas
-from tests.linear.mixed_cells import mixed_bar, mixed_plate
+from tests.fem.mixed_cells import mixed_bar, mixed_plate
 
 STRAIGHT = {
     "triangle": ([[0, 0], [1, 0], [0, 1]], 1 / 2),

@@ -29,7 +29,7 @@ from fenics_contact.mesh.plane import flattened
 from fenics_contact.mesh.quality import cell_volumes, jacobian_ratio, jacobians, volume
 from fenics_contact.shapes import Circle, Plane, SurfaceShape
 from fenics_contact.shapes.combined import Joined
-from tests.mesh_io.mesh_files import area
+from tests.readers.mesh_files import area
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from fenics_contact.mesh.cell_types import CELL_TYPES, QUADRILATERAL
 from fenics_contact.mesh.faces import cell_faces, neighbours, orient, vector_areas
 from fenics_contact.mesh.partition import check_face_connected
 from fenics_contact.mesh.quality import jacobian_ratio, jacobians, volume
-from tests.partition.counts import torn_node_counts
+from tests.mesh.counts import torn_node_counts
 
 CELLS = ["quadrilateral", "triangle"]
 NORMALS = {"x0": [-3, 0], "x1": [3, 0], "y0": [0, -2], "y1": [0, 2]}

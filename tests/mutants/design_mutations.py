@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.mutants.copy_of_package import Mutation
 
-GIVEN = "tests/shape/test_given_gap_sensitivity.py"
+GIVEN = "tests/design/test_given_gap_sensitivity.py"
 MERIT, NONLINEAR = "tests/optimize/test_bundle.py", "tests/optimize/test_nonlinear.py"
 
 DESIGN_MUTATIONS = (
@@ -21,7 +21,7 @@ DESIGN_MUTATIONS = (
         "ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11",
         "ADJOINT_SHARE, ADJOINT_FLOOR = 1e2, 1e-8",
         (
-            "tests/shape/test_units.py::"
+            "tests/design/test_units.py::"
             "test_the_adjoint_of_a_state_at_default_tolerance_is_more_accurate_than_the_state"
             "[energy-N and mm]",
         ),
@@ -31,7 +31,7 @@ DESIGN_MUTATIONS = (
         "design/memory.py",
         'self.error_by_tolerance = start.pop("alpha"), float(start.pop("error"))',
         'self.error_by_tolerance = start.pop("alpha"), 0.0 * float(start.pop("error"))',
-        ("tests/shape/test_resuming.py::test_what_error_went_with_which_tolerance_is_known_after_going_on",),
+        ("tests/design/test_resuming.py::test_what_error_went_with_which_tolerance_is_known_after_going_on",),
     ),
     Mutation(
         "planes of the bundle do not move with the centre",
@@ -46,8 +46,8 @@ DESIGN_MUTATIONS = (
         "by_edges = -scaled[..., None] * c[:, :, None]",
         "by_edges = -0.0 * scaled[..., None] * c[:, :, None]",
         (
-            "tests/shape/test_derivatives.py::test_each_term_agrees_with_central_differences",
-            "tests/shape/test_chain_sensitivity.py::test_the_adjoint_agrees_with_central_differences",
+            "tests/design/test_derivatives.py::test_each_term_agrees_with_central_differences",
+            "tests/design/test_chain_sensitivity.py::test_the_adjoint_agrees_with_central_differences",
         ),
     ),
     Mutation(
@@ -94,34 +94,34 @@ DESIGN_MUTATIONS = (
         "design/adjoint.py",
         "max(tolerance * begin.size, begin.rounding)",
         "tolerance * begin.size",
-        ("tests/shape/test_adjoint.py::test_the_elastic_energy_of_bodies_pressed_together_has_a_gradient",),
+        ("tests/design/test_adjoint.py::test_the_elastic_energy_of_bodies_pressed_together_has_a_gradient",),
     ),
     Mutation(
         "new meshes forget what designs have added to given gaps",
         "design/remeshed.py",
         "    if name not in given:",
         "    if name in given:",
-        ("tests/shape/test_remeshed.py::test_new_meshes_of_the_same_cells_have_the_same_objective[gap]",),
+        ("tests/design/test_remeshed.py::test_new_meshes_of_the_same_cells_have_the_same_objective[gap]",),
     ),
     Mutation(
         "states of designs ignore the tolerance of Newton's method",
         "_equilibrium/problem.py",
         "return (self.steps or AutomaticSteps()).newton.tolerance",
         "return 1e-6",
-        ("tests/shape/test_design.py::test_states_of_rubber_are_solved_to_newtons_tolerance",),
+        ("tests/design/test_design.py::test_states_of_rubber_are_solved_to_newtons_tolerance",),
     ),
     Mutation(
         "gradients of rubber hold weighted means where they are",
         "_pairing/sliding/points.py",
         "total += motion.gap_rows(some, self.coordinates).T @ by",
         "total += 0.0",
-        ("tests/shape/test_deformed_sensitivity.py::test_plane_blocks_that_meet_by_mortar",),
+        ("tests/design/test_deformed_sensitivity.py::test_plane_blocks_that_meet_by_mortar",),
     ),
     Mutation(
         "slip of weighted means begins where no design moves it",
         "_pairing/sliding/slip.py",
         "result = result - _of_nodes(width * now[met] + a, width * count).T @ rows",
         "result = result - 0.0 * _of_nodes(width * now[met] + a, width * count).T @ rows",
-        ("tests/shape/test_deformed_sensitivity.py::test_plane_blocks_that_meet_by_mortar",),
+        ("tests/design/test_deformed_sensitivity.py::test_plane_blocks_that_meet_by_mortar",),
     ),
 )

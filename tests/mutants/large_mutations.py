@@ -5,7 +5,7 @@ from __future__ import annotations
 from tests.mutants.copy_of_package import Mutation
 
 ONE_STEP = (
-    "tests/nonlinear/test_newton_steps.py::"
+    "tests/large_deformations/test_newton_steps.py::"
     "test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
 )
 
@@ -16,7 +16,7 @@ LARGE_MUTATIONS = (
         "blocks[number] = blocks[number] + mesh.matrix_of(softening)",
         "blocks[number] = blocks[number] + 0.97 * mesh.matrix_of(softening)",
         (
-            "tests/nonlinear/test_prescribed_motion.py::test_newton_is_quadratic_where_rims_slide_in_planes_of"
+            "tests/large_deformations/test_prescribed_motion.py::test_newton_is_quadratic_where_rims_slide_in_planes_of"
             "_symmetry_and_neighbours_pass_forces_on",
         ),
     ),
@@ -26,7 +26,7 @@ LARGE_MUTATIONS = (
         "np.minimum(usual / np.abs(compliance[soft]), 1.0)",
         "np.ones(np.count_nonzero(soft))",
         (
-            "tests/nonlinear/test_prescribed_motion.py::test_soft_rows_of_rims_between_many_parts_neither_cost"
+            "tests/large_deformations/test_prescribed_motion.py::test_soft_rows_of_rims_between_many_parts_neither_cost"
             "_products_nor_accuracy",
         ),
     ),
@@ -57,7 +57,7 @@ LARGE_MUTATIONS = (
         "[((1.0 - part) * weight, each) for weight, each in first.following]",
         "[(weight, each) for weight, each in first.following]",
         (
-            "tests/nonlinear/test_newton_steps.py::test_on_the_way_to_another_pressure_the_old_one_goes_as_the_new_one_comes",
+            "tests/large_deformations/test_newton_steps.py::test_on_the_way_to_another_pressure_the_old_one_goes_as_the_new_one_comes",
         ),
     ),
     Mutation(
@@ -66,7 +66,7 @@ LARGE_MUTATIONS = (
         "mixed = replace(mixed, torn=torn, following=now.following, heat=now.heat)",
         "mixed = replace(mixed, torn=torn, heat=now.heat)",
         (
-            "tests/nonlinear/test_newton_steps.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",
+            "tests/large_deformations/test_newton_steps.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",
         ),
     ),
     Mutation(
@@ -99,7 +99,7 @@ LARGE_MUTATIONS = (
         "rubbed += self.end.evaluation.rubbing",
         "rubbed = 0.0",
         (
-            "tests/nonlinear/test_prescribed_motion.py::test_friction_to_and_fro_within_a_load_step_is_the_sum"
+            "tests/large_deformations/test_prescribed_motion.py::test_friction_to_and_fro_within_a_load_step_is_the_sum"
             "_over_parts_with_histories_of_their_own",
         ),
     ),
@@ -118,21 +118,21 @@ LARGE_MUTATIONS = (
         "_large_deformations/equations.py",
         "ROUNDED = 4.0 *",
         "ROUNDED = 4000.0 *",
-        ("tests/nonlinear/test_newton_steps.py::test_rounding_alone_hides_nothing_of_a_small_load",),
+        ("tests/large_deformations/test_newton_steps.py::test_rounding_alone_hides_nothing_of_a_small_load",),
     ),
     Mutation(
         "a tenth of what would strain bodies by their displacement counts as no force",
         "_large_deformations/equations.py",
         "FORCE_FLOOR = 1e-4",
         "FORCE_FLOOR = 1e-1",
-        ("tests/nonlinear/test_newton_steps.py::test_a_small_load_on_a_body_that_is_moved_far_is_balanced",),
+        ("tests/large_deformations/test_newton_steps.py::test_a_small_load_on_a_body_that_is_moved_far_is_balanced",),
     ),
     Mutation(
         "pressures of bodies that deform much are by undeformed area",
         "_pairing/sliding/means.py",
         "np.where(self.much, self.now, self.before) * self.share",
         "self.before * self.share",
-        ("tests/nonlinear/test_true_pressure.py::test_an_incompressible_block_presses_with_its_stress",),
+        ("tests/large_deformations/test_true_pressure.py::test_an_incompressible_block_presses_with_its_stress",),
     ),
     Mutation(
         "points at the rim of the master have all of their area",
@@ -140,7 +140,7 @@ LARGE_MUTATIONS = (
         "np.maximum(part, 0.5), part > 0.5",
         "1.0, False",
         (
-            "tests/nonlinear/test_true_pressure.py::"
+            "tests/large_deformations/test_true_pressure.py::"
             "test_pressures_at_the_rim_of_the_master_are_those_of_small_strain",
         ),
     ),
@@ -149,6 +149,6 @@ LARGE_MUTATIONS = (
         "design/sensitivity.py",
         "free_part(by_places, every, ~np.isnan(moved.prescribed), axes)",
         "0.0 * by_places",
-        ("tests/shape/test_deformed_sensitivity.py::test_plane_blocks[plane-0.0-0.0-statuses0]",),
+        ("tests/design/test_deformed_sensitivity.py::test_plane_blocks[plane-0.0-0.0-statuses0]",),
     ),
 )

@@ -8,13 +8,13 @@ from tests.mutants.large_mutations import LARGE_MUTATIONS
 from tests.mutants.unseen_mutations import UNSEEN_MUTATIONS
 
 CONIC = (
-    "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"
+    "tests/equilibrium/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"
     "[block on plane, Tresca-hexahedron-face Newton]"
 )
 
 PARTS = "tests/accuracy/test_certificate.py"
 NARROW = "tests/surfaces/test_true_surface.py"
-RIGID = "tests/contact/test_rigid_surfaces.py"
+RIGID = "tests/equilibrium/test_rigid_surfaces.py"
 
 MUTATIONS = (
     *DESIGN_MUTATIONS,
@@ -46,14 +46,14 @@ MUTATIONS = (
         "_pairing/mortar/coupling.py",
         "None if slave.whole is None else _scaled(means[node])",
         "None",
-        ("tests/contact/test_quadratic_mortar.py::test_a_uniform_pressure_passes_between_edges",),
+        ("tests/equilibrium/test_quadratic_mortar.py::test_a_uniform_pressure_passes_between_edges",),
     ),
     Mutation(
         "bodies overlap by mortar where a surface turns away from the other one",
         "_pairing/search.py",
         "nodal = creased & (value < ",
         "nodal = creased & (np.inf < ",
-        ("tests/shape/test_derivatives.py::test_bodies_that_only_touch_do_not_overlap_at_creases",),
+        ("tests/design/test_derivatives.py::test_bodies_that_only_touch_do_not_overlap_at_creases",),
     ),
     Mutation(
         "mortar integrals do not go around the axis",
@@ -84,7 +84,7 @@ MUTATIONS = (
         "results/contact.py",
         "return self.normal_force / self.area",
         "return 1.004 * self.normal_force / self.area",
-        ("tests/contact/test_state.py::test_pressures_integrate_to_the_load",),
+        ("tests/equilibrium/test_state.py::test_pressures_integrate_to_the_load",),
     ),
     Mutation(
         "Tresca's bound is too large by a percent",
@@ -98,7 +98,7 @@ MUTATIONS = (
         "_pairing/search.py",
         'gap = evaluate_shape(obstacle, "distance", slave.surface.points[chosen])',
         'gap = 0.0 * evaluate_shape(obstacle, "distance", slave.surface.points[chosen])',
-        ("tests/contact/test_obstacles.py::test_nodes_lie_outside_of_the_round_obstacle_after_pressing",),
+        ("tests/equilibrium/test_obstacles.py::test_nodes_lie_outside_of_the_round_obstacle_after_pressing",),
     ),
     Mutation(
         "bodies may overlap",
@@ -119,42 +119,42 @@ MUTATIONS = (
         "_equilibrium/warnings.py",
         "if error > SHARE * moved:",
         "if error > 10.0 * SHARE * moved:",
-        ("tests/contact/test_unheld.py::test_a_roller_is_told_of_by_facets_alone",),
+        ("tests/equilibrium/test_unheld.py::test_a_roller_is_told_of_by_facets_alone",),
     ),
     Mutation(
         "no body is ever too loose",
         "_equilibrium/static_admissibility.py",
         "LEFT = 1e-8",
         "LEFT = 1e3",
-        ("tests/contact/test_held.py::test_a_body_pulled_off_its_floor_is_named_with_the_way_it_goes",),
+        ("tests/equilibrium/test_held.py::test_a_body_pulled_off_its_floor_is_named_with_the_way_it_goes",),
     ),
     Mutation(
         "strain energy is too large by 0.2 percent",
         "results/state.py",
         "strained = 0.5 * internal",
         "strained = 0.501 * internal",
-        ("tests/contact/test_state.py::test_the_primal_energy_is_the_dual_energy_and_contains_the_friction",),
+        ("tests/equilibrium/test_state.py::test_the_primal_energy_is_the_dual_energy_and_contains_the_friction",),
     ),
     Mutation(
         "von Mises stress is too small by 0.3 percent",
         "results/fields.py",
         "ufl.sqrt(1.5 * ufl.inner(deviator, deviator))",
         "ufl.sqrt(1.49 * ufl.inner(deviator, deviator))",
-        ("tests/models/test_loads.py::test_a_plate_is_stretched_and_contracts",),
+        ("tests/materials/test_loads.py::test_a_plate_is_stretched_and_contracts",),
     ),
     Mutation(
         "nodal stress forgets half of the shear",
         "results/fields.py",
         "(gradients[:, j, i] if i != j else 0.0)",
         "0.0",
-        ("tests/contact/test_units.py::test_the_stress_of_a_thick_cylinder_converges_to_lame",),
+        ("tests/equilibrium/test_units.py::test_the_stress_of_a_thick_cylinder_converges_to_lame",),
     ),
     Mutation(
         "reactions contain what contact exerts on prescribed components",
         "results/forces.py",
         "torn.force(multiplier)) - joined",
         "torn.force(multiplier))",
-        ("tests/contact/test_resultants.py::test_all_forces_balance",),
+        ("tests/equilibrium/test_resultants.py::test_all_forces_balance",),
     ),
     Mutation(
         "nodes between materials show the smaller stress",
@@ -162,7 +162,7 @@ MUTATIONS = (
         "np.where(np.isnan(size), -1.0, size).argmax(axis=0)",
         "np.where(np.isnan(size), np.inf, size).argmin(axis=0)",
         (
-            "tests/io/test_fields_in_files.py::"
+            "tests/output/test_fields_in_files.py::"
             "test_vtu_files_hold_at_a_node_between_materials_the_larger_stress",
         ),
     ),
@@ -171,7 +171,7 @@ MUTATIONS = (
         "_fem/loads.py",
         "moment = lever + (",
         "moment = 0.0 * lever + (",
-        ("tests/contact/test_resultants.py::test_a_force_at_a_point_is_held_there",),
+        ("tests/equilibrium/test_resultants.py::test_a_force_at_a_point_is_held_there",),
     ),
     Mutation(
         "loads at points of rigid surfaces are forgotten",
@@ -200,7 +200,7 @@ MUTATIONS = (
         "np.trace(turned) * spins @ spins.T - spins @ turned @ spins.T",
         "0.0 * spins @ turned @ spins.T",
         (
-            "tests/nonlinear/test_driven_tools.py::test_the_stiffness_of_a_rigid_surface_is_the_derivative_of_its_loads",
+            "tests/large_deformations/test_driven_tools.py::test_the_stiffness_of_a_rigid_surface_is_the_derivative_of_its_loads",
         ),
     ),
     Mutation(
@@ -208,14 +208,17 @@ MUTATIONS = (
         "results/forces.py",
         "own[:, None] * components",
         "(own > 0)[:, None] * components",
-        ("tests/contact/test_resultants.py::test_supports_that_share_nodes_share_their_reaction",),
+        ("tests/equilibrium/test_resultants.py::test_supports_that_share_nodes_share_their_reaction",),
     ),
     Mutation(
         "starts from coarser meshes glue against all contact forces",
         "_equilibrium/starts.py",
         "np.where(glued, 0.0, balanced - start)",
         "np.where(glued, 0.0, balanced)",
-        ("tests/contact/test_nested_start.py::test_on_the_same_meshes_the_start_is_the_answer[tie beside]",),
+        (
+            "tests/equilibrium/test_nested_start.py::"
+            "test_on_the_same_meshes_the_start_is_the_answer[tie beside]",
+        ),
     ),
     Mutation(
         "load steps on other meshes forget where the one before ended",
@@ -238,7 +241,7 @@ MUTATIONS = (
         "_equilibrium/previous.py",
         "return torn if self.before is None else",
         "return torn if self.before is not None else",
-        ("tests/contact/test_steps.py::test_unloading_does_not_return_to_the_start",),
+        ("tests/equilibrium/test_steps.py::test_unloading_does_not_return_to_the_start",),
     ),
     Mutation(
         "the estimate of the mesh's error is half of it",
@@ -287,14 +290,14 @@ MUTATIONS = (
         "materials/elastic.py",
         "return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(self.dims[0])",
         "return -(3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(self.dims[0])",
-        ("tests/models/test_loads.py::test_a_free_body_expands_evenly_and_without_stress",),
+        ("tests/materials/test_loads.py::test_a_free_body_expands_evenly_and_without_stress",),
     ),
     Mutation(
         "sliding ties are bonded",
         "feti/ties.py",
         "points = ties.part(~are_sliding(scene.ties, ties.pair))",
         "points = ties",
-        ("tests/contact/test_ties.py::test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to",),
+        ("tests/equilibrium/test_ties.py::test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to",),
     ),
     Mutation(
         "an answer need not be in balance",
@@ -308,7 +311,7 @@ MUTATIONS = (
         "_pairing/points.py",
         "HELD = 1e-6",
         "HELD = 1e-5",
-        ("tests/contact/test_symmetry_planes.py::test_what_is_left_free_by_rounding_alone_is_held",),
+        ("tests/equilibrium/test_symmetry_planes.py::test_what_is_left_free_by_rounding_alone_is_held",),
     ),
     Mutation(
         "subdomains that are almost alike share factors",
@@ -336,7 +339,7 @@ MUTATIONS = (
         "feti/condensation.py",
         "unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))",
         "unit = 1.0",
-        ("tests/contact/test_units.py::test_subdomains_are_factored_alike_in_all_units",),
+        ("tests/equilibrium/test_units.py::test_subdomains_are_factored_alike_in_all_units",),
     ),
     Mutation(
         "Tresca's bound and the load are in two units",
@@ -344,7 +347,7 @@ MUTATIONS = (
         "np.minimum(torn.groups.slips.tresca_bound / scale, largest)",
         "np.minimum(torn.groups.slips.tresca_bound, largest)",
         (
-            "tests/contact/test_held.py::test_the_limit_of_friction_does_not_depend_on_the_units"
+            "tests/equilibrium/test_held.py::test_the_limit_of_friction_does_not_depend_on_the_units"
             "[1e-06-1e-06-friction1]",
         ),
     ),
@@ -354,7 +357,7 @@ MUTATIONS = (
         "start = master.points[nodes[:, 0]]",
         "start = 0.0 * master.points[nodes[:, 0]]",
         (
-            "tests/contact/test_units.py::test_no_contact_point_is_lost_far_from_the_origin[3-hexahedron-node]",
+            "tests/equilibrium/test_units.py::test_no_contact_point_is_lost_far_from_the_origin[3-hexahedron-node]",
         ),
     ),
     Mutation(
@@ -379,7 +382,7 @@ MUTATIONS = (
         "_fem/kinematics.py",
         "return np.asarray(tensors + apart[..., None] * np.eye(3))",
         "return np.asarray(tensors + 0.5 * apart[..., None] * np.eye(3))",
-        ("tests/models/test_history_mechanics.py::test_points_of_a_cell_feel_its_mean_change_of_volume",),
+        ("tests/materials/test_history_mechanics.py::test_points_of_a_cell_feel_its_mean_change_of_volume",),
     ),
     Mutation(
         "arcs are twice as high over their cubics",
@@ -408,7 +411,7 @@ MUTATIONS = (
         "self.gather_displacement(name) if body.deforms_much else 0.0",
         "0.0",
         (
-            "tests/nonlinear/test_prescribed_motion.py::"
+            "tests/large_deformations/test_prescribed_motion.py::"
             "test_forces_and_moments_balance_beside_bodies_of_small_strain",
         ),
     ),
@@ -417,28 +420,28 @@ MUTATIONS = (
         "_pairing/search.py",
         "np.where(lost, own, weight @ opposite)",
         "weight @ opposite",
-        ("tests/shape/test_derivatives.py::test_gaps_are_closable_from_both_sides_and_at_the_rim_means",),
+        ("tests/design/test_derivatives.py::test_gaps_are_closable_from_both_sides_and_at_the_rim_means",),
     ),
     Mutation(
         "slip of earlier steps does not turn with the master",
         "_equilibrium/deformed.py",
         "points.carry_slip(before.contact.total_slip, old)",
         "points.carry_tangential(before.contact.total_slip, old)",
-        ("tests/nonlinear/test_prescribed_motion.py::test_slip_of_earlier_steps_turns_about_the_normal",),
+        ("tests/large_deformations/test_prescribed_motion.py::test_slip_of_earlier_steps_turns_about_the_normal",),
     ),
     Mutation(
         "the dilatation of hexahedra27 is constant in a cell",
         "_fem/templates.py",
         'LINEAR = ("quadrilateral9", "hexahedron27")',
         'LINEAR = ("quadrilateral9",)',
-        ("tests/models/test_hyperelasticity.py::test_only_rigid_motions_of_a_cell_are_without_energy",),
+        ("tests/materials/test_hyperelasticity.py::test_only_rigid_motions_of_a_cell_are_without_energy",),
     ),
     Mutation(
         "quadratic tetrahedra do not feel what their mean dilatation leaves out",
         "_fem/templates.py",
         'UNSEEN = ("tetrahedron10",)',
         "UNSEEN = ()",
-        ("tests/models/test_hyperelasticity.py::test_only_rigid_motions_of_a_cell_are_without_energy",),
+        ("tests/materials/test_hyperelasticity.py::test_only_rigid_motions_of_a_cell_are_without_energy",),
     ),
     Mutation(
         "a yield stress that has fallen to zero still has a slope",
@@ -455,7 +458,7 @@ MUTATIONS = (
         "(0.75 * spread)",
         "(1.0 * spread)",
         (
-            "tests/contact/test_state.py::"
+            "tests/equilibrium/test_state.py::"
             "test_the_rim_lies_where_pressure_and_gap_of_a_smooth_contact_place_it",
         ),
     ),
@@ -471,7 +474,7 @@ MUTATIONS = (
         "feti/following.py",
         "(self.means.T @ matrix @ self.means + typical",
         "(matrix + 0.0 * typical",
-        ("tests/linear/test_hanging.py::test_the_displacement_is_that_of_a_monolithic_solve",),
+        ("tests/fem/test_hanging.py::test_the_displacement_is_that_of_a_monolithic_solve",),
     ),
     Mutation(
         "siblings at hanging nodes are torn apart",

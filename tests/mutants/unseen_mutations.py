@@ -59,21 +59,21 @@ UNSEEN_MUTATIONS = (
         "_scene/surface_laws.py",
         'np.searchsorted(self.slip, slip, side="right")',
         'np.searchsorted(self.slip, slip, side="left")',
-        ("tests/contact/test_friction_by_slip.py::test_the_slope_at_a_corner_of_a_table_is_that_beyond_it",),
+        ("tests/equilibrium/test_friction_by_slip.py::test_the_slope_at_a_corner_of_a_table_is_that_beyond_it",),
     ),
     Mutation(
         "partners are where the first node of both sides lies",
         "_scene/constraints.py",
         "points.mean(axis=0) - start.mean(axis=0)",
         "points[0] - start[0]",
-        ("tests/contact/test_linear_constraints.py::test_partners_are_found_in_any_order_of_the_nodes",),
+        ("tests/equilibrium/test_linear_constraints.py::test_partners_are_found_in_any_order_of_the_nodes",),
     ),
     Mutation(
         "the area of a section is that of the facets that it cuts",
         "_scene/preloads.py",
         "vector_areas(mesh.points, facets) @ self.normal(mesh)",
         "np.linalg.norm(vector_areas(mesh.points, facets), axis=1)",
-        ("tests/contact/test_preloads.py::test_the_area_of_an_oblique_section_is_that_across_its_normal",),
+        ("tests/equilibrium/test_preloads.py::test_the_area_of_an_oblique_section_is_that_across_its_normal",),
     ),
     Mutation(
         "rims of bodies with a chart move by whole bulges",
@@ -122,7 +122,7 @@ UNSEEN_MUTATIONS = (
         "qp/rescue.py",
         "factor = 1.0 if number < 4 else",
         "factor = 1.0 if number >= 0 else",
-        ("tests/contact/test_rigid_bodies.py::test_springs_of_other_stiffness_free_a_stuck_newton",),
+        ("tests/equilibrium/test_rigid_bodies.py::test_springs_of_other_stiffness_free_a_stuck_newton",),
     ),
     Mutation(
         "solvers in turn begin anew",

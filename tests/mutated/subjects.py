@@ -11,7 +11,7 @@ from fenics_contact.gallery import block, rectangle
 from fenics_contact.readers.gmsh_session import silenced
 from tests.decks import columns
 from tests.decks import texts as parts
-from tests.mesh_io.mesh_files import joined, with_tags
+from tests.readers.mesh_files import joined, with_tags
 
 ROOT = Path(__file__).parents[2]
 
@@ -163,7 +163,7 @@ def _vtu(folder: Path) -> Path:
 
 
 def _step(folder: Path) -> Path:
-    from tests.mesh_io.msh_files import own_gmsh
+    from tests.readers.msh_files import own_gmsh
 
     with own_gmsh() as gmsh, silenced(1):
         gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)

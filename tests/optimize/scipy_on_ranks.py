@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 from fenics_contact import Coulomb
 from fenics_contact.design import ForScipy, LinearConstraints
-from tests.shape.blocks import block_on_block, problem
-from tests.shape.rank_cases import same_bits
+from tests.design.blocks import block_on_block, problem
+from tests.design.rank_cases import same_bits
 
 comm = MPI.COMM_WORLD
 moving = problem(block_on_block(Coulomb(0.38), load=(0.6, 0.12, -2.0)), comm)

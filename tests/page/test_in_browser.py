@@ -13,8 +13,8 @@ from mpi4py import MPI
 from fenics_contact import AccurateResult, Level, Status, result_page, write_result
 from fenics_contact.output import ResultSeries
 from tests.page.browser import CHROMIUM, DRIVER, MISSING, Browser, browser
-from tests.viz.plane_states import flat_pad, plane_block, tall_pad
-from tests.viz.states import pixels, touching_blocks
+from tests.pictures.plane_states import flat_pad, plane_block, tall_pad
+from tests.pictures.states import pixels, touching_blocks
 
 pytestmark = pytest.mark.skipif(DRIVER is None or CHROMIUM is None, reason=MISSING)
 

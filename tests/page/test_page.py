@@ -27,9 +27,9 @@ from fenics_contact.pictures import Units
 from fenics_contact.pictures.section import rounded_up
 from fenics_contact.shapes import Box, Cone, SurfaceShape, Torus
 from tests.page.contents import content
-from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
-from tests.viz.plane_states import plane_block
-from tests.viz.states import pulled, touching_blocks
+from tests.pictures.moving_states import block_among_movers, pressed_by_a_lid
+from tests.pictures.plane_states import plane_block
+from tests.pictures.states import pulled, touching_blocks
 
 
 def text_of(page: str | None) -> str:
@@ -390,7 +390,7 @@ RANKS = """
     from fenics_contact import result_page
     from fenics_contact._page.page import Page
     from fenics_contact import Coulomb
-    from tests.contact.gallery import partitions, two_blocks
+    from tests.equilibrium.gallery import partitions, two_blocks
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
     scene = two_blocks(Coulomb(0.4))

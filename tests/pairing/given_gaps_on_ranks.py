@@ -12,8 +12,8 @@ from mpi4py import MPI
 
 from fenics_contact import ContactProblem, Coulomb, Scene, solve_scene
 from fenics_contact.errors import FenicsContactError
-from tests.contact.gallery import pressed_block, two_blocks
-from tests.contact.press_fits import press_fit
+from tests.equilibrium.gallery import pressed_block, two_blocks
+from tests.equilibrium.press_fits import press_fit
 
 
 def varying(points: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ from fenics_contact.gallery import rectangle
 from fenics_contact.materials import NeoHooke
 from fenics_contact.mesh import quadratic
 from tests.conftest import run_on_ranks
-from tests.linear.monolithic import _forms
+from tests.fem.monolithic import _forms
 from tests.pairing.sliding_on_ranks import collect
 from tests.pairing.sliding_scenes import (
     KINDS,

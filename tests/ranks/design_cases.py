@@ -22,9 +22,9 @@ from fenics_contact import (
 from fenics_contact.design import BundleTrust, ContactForces, Partials, TotalPotential, VolumeIntegral
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.results import ContactResult
+from tests.design.blocks import side
 from tests.ranks.given import CUT, MESH, case, fails_on_last, is_last, scene
 from tests.ranks.scene_cases import OwnFloor, flat, upward
-from tests.shape.blocks import side
 
 
 def design(comm: MPI.Comm, objective: Any = TotalPotential(), given: Scene | None = None) -> ShapeProblem:

@@ -36,7 +36,7 @@ from fenics_contact.materials import (
     Ogden,
     StVenantKirchhoff,
 )
-from tests.models.deformed import patch_of, skew_patch, smooth_field
+from tests.materials.deformed import patch_of, skew_patch, smooth_field
 
 E, NU, YIELD, HARDER = 200.0, 0.3, 1.0, 5.0
 ALPHA, HOT = 6e-4, 20.0

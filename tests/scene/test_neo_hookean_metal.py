@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from fenics_contact import Body
 from fenics_contact._fem.mechanics import MaterialStep
 from fenics_contact.materials import NeoHookeanPlasticity
-from tests.models.deformed import patch_of, skew_patch, smooth_field
+from tests.materials.deformed import patch_of, skew_patch, smooth_field
 from tests.scene.material_points import TURN, at_rest, deformations, in_tension, tangent_error
 
 E, NU, YIELD = 2e5, 0.3, 200.0

@@ -14,7 +14,7 @@ from fenics_contact import RigidSphere, RigidSurface, RigidTool, ToolMotion, rea
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import SceneFileError
 from tests.scene_file.texts import changed
-from tests.surface_shapes.bodies import CUBE, SIDES
+from tests.shapes.bodies import CUBE, SIDES
 
 SELF = MPI.COMM_SELF
 STEEL = {"young_modulus": 2.1e5, "poisson_ratio": 0.3}

@@ -28,8 +28,8 @@ from fenics_contact.study.report import reliable, table_page
 from fenics_contact.study.results import check_certificates, extrapolate, measured_rate
 from fenics_contact.study.scenes import find_study
 from tests.conftest import ROOT
+from tests.pictures.states import contains, pixels
 from tests.study.samples import BASE, results, run
-from tests.viz.states import contains, pixels
 
 
 def test_results_survive_their_file(tmp_path: Path) -> None:

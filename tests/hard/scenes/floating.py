@@ -22,7 +22,7 @@ from fenics_contact import (
 )
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block
-from tests.contact.gallery import block_on_plane, cornered_block, stack, two_blocks
+from tests.equilibrium.gallery import block_on_plane, cornered_block, stack, two_blocks
 from tests.hard.scenes.parts import SOFT, STIFF, clamped, cubes, force
 from tests.hard.trial import Trial, cut_trial, trial
 

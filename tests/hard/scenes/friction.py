@@ -26,7 +26,7 @@ from fenics_contact._scene.pairs import Friction
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from tests.contact.gallery import SOFT, block_on_plane, pressed_block, stack
+from tests.equilibrium.gallery import SOFT, block_on_plane, pressed_block, stack
 from tests.hard.invariants import violations
 from tests.hard.scenes.parts import FLOOR, cubes, force
 from tests.hard.transform import turned

@@ -11,7 +11,7 @@ from fenics_contact import Body, BodyMesh, Coulomb, Scene
 from fenics_contact.gallery import block
 from fenics_contact.mesh import scaled_jacobian
 from fenics_contact.mesh.quality import jacobians
-from tests.contact.gallery import SOFT, block_on_plane, crowned, two_blocks
+from tests.equilibrium.gallery import SOFT, block_on_plane, crowned, two_blocks
 from tests.hard.transform import renumbered_mesh, turned
 from tests.hard.trial import Answer, Trial, bisected, cut_trial, trial
 

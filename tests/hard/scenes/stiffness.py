@@ -26,9 +26,9 @@ from fenics_contact import (
 from fenics_contact.gallery import block, box_lattice, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStress
 from fenics_contact.mesh import quadratic
-from tests.contact.contrast import FRICTION, Blocks, Regions
-from tests.contact.gallery import crowned
-from tests.contact.hertz import Hertz, errors
+from tests.equilibrium.contrast import FRICTION, Blocks, Regions
+from tests.equilibrium.gallery import crowned
+from tests.equilibrium.hertz import Hertz, errors
 from tests.hard.scenes.parts import FLOOR
 from tests.hard.trial import Trial, bisected, boxes, cut_trial, failing_trial, ragged, trial
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from fenics_contact import Coulomb
-from tests.contact.gallery import two_blocks
+from tests.equilibrium.gallery import two_blocks
 from tests.hard.transform import in_units
 from tests.hard.trial import Answer, Trial, cut_trial, trial
 
