@@ -12,6 +12,8 @@ STUDIES ?= hertz cattaneo_mindlin chain_links
 PYTHON ?=
 WHEEL ?=
 JOBS ?= 2
+COUNT ?= 1000
+KIND ?= linear
 export WHEEL
 
 ifeq ($(strip $(PYTHON)),)
@@ -27,7 +29,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-core test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-adaptive study-large study-peers lint setup setup-demo
+.PHONY: help demo demos notebooks test test-core test-slow test-hard test-claims mutants random-scenes spoilt-files docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-adaptive study-large study-peers lint setup setup-demo
 
 help: ## Show this list
 	@echo "Targets:"
@@ -41,6 +43,7 @@ help: ## Show this list
 	@echo "  STUDIES=hertz        which studies (all three); NP ranks each"
 	@echo "  BENCH=quick|full     small cases once, or all of them (full)"
 	@echo "  JOBS=4               tests at a time (2)"
+	@echo "  COUNT=200            how many random scenes or spoilt files (1000)"
 	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"
 	@echo "  WHEEL=1              set up FEniCSx without root, by a third party's wheel, which is alpha (0: by packages)"
 
@@ -78,6 +81,12 @@ test-claims: $(prepare) ## Run what claims rest on: effectivity under contact, c
 
 mutants: $(prepare) ## Make mistakes in a copy of the package, which the quick tests must find
 	$(launch) 1 $(python) -m pytest tests/mutants -m slow
+
+random-scenes: $(prepare) ## Solve COUNT scenes made from seeds and verify every answer by other means, or KIND=deformed|corners|meetings
+	$(python) -m tools.random_scenes --count $(COUNT) --kind $(KIND) --processes $(JOBS)
+
+spoilt-files: $(prepare) ## Plan COUNT decks, scene files, meshes and tools with mistakes: planned or refused in words
+	$(python) -m tools.mutated --count $(COUNT)
 
 docs: $(prepare) ## Build the documentation; output/docs/index.html
 	$(launch) 1 $(python) -m sphinx -W --keep-going -q -c docs -d output/docs-doctrees . output/docs

@@ -31,7 +31,7 @@ from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import block, rectangle, rectangle_lattice
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
-from tests.random_scenes.corners import graded
+from tools.random_scenes.corners import graded
 
 
 def squares(mesh: BodyMesh, stiffer: float, hard: np.ndarray) -> Body:

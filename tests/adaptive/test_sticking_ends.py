@@ -24,7 +24,7 @@ from fenics_contact.design import FrictionWork, StrainEnergy
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
-from tests.random_scenes.corners import corners
+from tools.random_scenes.corners import corners
 
 
 def punch(friction: float, cell: str = "quadrilateral", order: int = 1, push: float = 0.02) -> Scene:

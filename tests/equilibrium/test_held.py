@@ -44,7 +44,7 @@ from tests.equilibrium.gallery import (
     stack,
     two_blocks,
 )
-from tests.hard.transform import in_units
+from tools.hard_cases.transform import in_units
 
 DOWN, ALONG = -4.0, 2.0  # the load of the block on the plane, with its push of 1
 NUMBERS = r"\(([^)]*)\)"

@@ -32,7 +32,7 @@ from fenics_contact import (
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.results.deformed_state import AnyState
-from tests.hard.transform import renumbered_mesh
+from tools.hard_cases.transform import renumbered_mesh
 
 STEEL = PlaneStrain(1.0, 0.3)
 #: Laws of closure with the distance at which pressure begins.

@@ -31,7 +31,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.mesh import quadratic
-from tests.hard.transform import renumbered_mesh
+from tools.hard_cases.transform import renumbered_mesh
 
 LAWS = {"low": IsotropicElasticity(1.0, 0.3), "up": IsotropicElasticity(2.0, 0.2)}
 SUNK, DRAWN = 0.02, 0.01

@@ -35,7 +35,7 @@ from fenics_contact.mesh import quadratic
 from tests.conftest import run_on_ranks
 from tests.equilibrium.bedded import FORCE, Bedded, pushed
 from tests.equilibrium.resultant_cases import BESIDE, GIVEN, MOMENT, SCENES, numbers, solved
-from tests.hard.invariants import Whole
+from tools.hard_cases.invariants import Whole
 
 SCRIPT = Path(__file__).with_name("resultant_cases.py")
 STEEL = IsotropicElasticity(1000.0, 0.3)

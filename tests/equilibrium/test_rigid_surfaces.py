@@ -40,7 +40,7 @@ from fenics_contact.mesh import quadratic
 from fenics_contact.results import RigidMotion
 from fenics_contact.results.deformed_state import AnyState
 from tests.equilibrium.rigid_cases import FORCE, MOMENT, POINT, SCENES, SOFT, bar, numbers, shaft, solved
-from tests.hard.invariants import Whole
+from tools.hard_cases.invariants import Whole
 
 SCRIPT = Path(__file__).with_name("rigid_cases.py")
 COMM = MPI.COMM_SELF

@@ -48,7 +48,7 @@ from tests.equilibrium.gallery import (
 from tests.equilibrium.stress_cases import PEAK, composite, cylinder, lame, line_contact, punched
 from tests.equilibrium.stress_cases import SCENES as STRESSED
 from tests.equilibrium.stress_cases import solved as solved_stress
-from tests.hard.transform import in_units, turned
+from tools.hard_cases.transform import in_units, turned
 
 #: Units of length and force in which stiffness and moduli become as small and as large as can be.
 UNITS = [(1e12, 1e-12), (1e-12, 1e12), (1e-12, 1e-12)]

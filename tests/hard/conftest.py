@@ -10,7 +10,7 @@ from typing import Protocol
 
 import pytest
 
-from tests.hard.table import Row, write
+from tools.hard_cases.table import Row, write
 
 HERE = Path(__file__).parent
 ROWS = pytest.StashKey[list[Row]]()

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.errors import FenicsContactError
 from tests.hard.scenes import TRIALS
-from tests.hard.trial import Answer, bisected
+from tools.hard_cases.trial import Answer, bisected
 
 
 def answer_of(sentence: str, comm: MPI.Comm) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from fenics_contact import DeformedState
 from tests.hard.conftest import Record
 from tests.hard.deformed import CASES
 from tests.hard.deformed.case import TOLERANCE, Case, difference, displacement, violations
-from tests.hard.trial import scene_size, statuses
+from tools.hard_cases.trial import scene_size, statuses
 
 GROUP = "deformed"
 

@@ -15,8 +15,8 @@ from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse, solve
 from fenics_contact.results import Damping
 from tests.hard.conftest import Record
-from tests.hard.trial import fallbacks
 from tests.qp.published_friction import CASES, cone_residual, published
+from tools.hard_cases.trial import fallbacks
 
 TOLERANCE = 1e-8
 SOLVERS: dict[str, DualSolver] = {

@@ -11,9 +11,9 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.errors import ConvergenceError
-from tests.hard.invariants import assert_holds, violations
 from tests.hard.scenes import TRIALS
-from tests.hard.trial import Trial
+from tools.hard_cases.invariants import assert_holds, violations
+from tools.hard_cases.trial import Trial
 
 
 @pytest.mark.claim

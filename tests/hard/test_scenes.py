@@ -15,9 +15,9 @@ from fenics_contact import State
 from fenics_contact.errors import ConvergenceError
 from tests.conftest import run_on_ranks
 from tests.hard.conftest import Record
-from tests.hard.invariants import assert_holds, violations
 from tests.hard.scenes import TRIALS
-from tests.hard.trial import OTHER_UNITS, Answer, Trial, fallbacks, scene_size, statuses
+from tools.hard_cases.invariants import assert_holds, violations
+from tools.hard_cases.trial import OTHER_UNITS, Answer, Trial, fallbacks, scene_size, statuses
 
 #: The largest number of ranks of any case, and the seconds that all of them may take there.
 TIMEOUT = 3000.0

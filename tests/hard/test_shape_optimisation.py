@@ -16,9 +16,9 @@ from fenics_contact.qp import FaceNewton
 from tests.design.pressed import DESIGN
 from tests.design.resumed_cases import BOUND, minimised, posed
 from tests.hard.conftest import Record
-from tests.hard.invariants import violations
 from tests.hard.shapes import carved, kink, on_a_ramp, thick
-from tests.hard.trial import scene_size, statuses
+from tools.hard_cases.invariants import violations
+from tools.hard_cases.trial import scene_size, statuses
 
 GROUP = "optimisation"
 #: A slope of one, and how far the ends of the ramp may move.

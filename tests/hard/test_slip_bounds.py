@@ -11,7 +11,7 @@ from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse, solve
 from tests.equilibrium.gallery import partitions, pressed_block
 from tests.hard.conftest import Record
-from tests.hard.trial import TOLERANCE, fallbacks
+from tools.hard_cases.trial import TOLERANCE, fallbacks
 
 SOLVERS: dict[str, DualSolver] = {
     "face Newton": FaceNewton(tolerance=TOLERANCE),

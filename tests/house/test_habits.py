@@ -24,7 +24,7 @@ def names_used(tree: ast.AST) -> set[str]:
 
 def python_files() -> list[Path]:
     """Return every Python file of the project."""
-    folders = ("fenics_contact", "tests", "demos", "benchmarks", "docs", "notebooks", "scripts")
+    folders = ("fenics_contact", "tests", "demos", "benchmarks", "docs", "notebooks", "scripts", "tools")
     return [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.mutants.copy_of_package import FAILED, PASSED, ROOT, Copy, Mutation, replaced
-from tests.mutants.mutations import MUTATIONS
+from tools.mutants.copy_of_package import FAILED, PASSED, ROOT, Copy, Mutation, replaced
+from tools.mutants.mutations import MUTATIONS
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """Files with mistakes are planned or refused in words: no traceback, no warning of numpy, no hang.
 
-Thousands of them: ``python -m tests.mutated --count 2000``.
+Thousands of them: ``python -m tools.mutated --count 2000``.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.mutated.judging import judged, run
-from tests.mutated.subjects import SUBJECTS
+from tools.mutated.judging import judged, run
+from tools.mutated.subjects import SUBJECTS
 
 
 @pytest.mark.parametrize("subject", SUBJECTS)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fenics_contact.materials import PlaneStrain
-from tests.random_scenes.corner_intervals import judge_corners
-from tests.random_scenes.corners import Corners, corners, graded
-from tests.random_scenes.judge import GOOD, Outcome
+from tools.random_scenes.corner_intervals import judge_corners
+from tools.random_scenes.corners import Corners, corners, graded
+from tools.random_scenes.judge import GOOD, Outcome
 
 
 def test_layers_get_wider_towards_the_middle_of_blocks() -> None:

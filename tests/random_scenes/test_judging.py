@@ -28,12 +28,12 @@ from fenics_contact import (
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
-from tests.random_scenes import runner
-from tests.random_scenes.generator import Sample, sample
-from tests.random_scenes.judge import Outcome, Verdict
-from tests.random_scenes.refusals import unjust
-from tests.random_scenes.revolved import revolved
-from tests.random_scenes.verifier import complaints
+from tools.random_scenes import runner
+from tools.random_scenes.generator import Sample, sample
+from tools.random_scenes.judge import Outcome, Verdict
+from tools.random_scenes.refusals import unjust
+from tools.random_scenes.revolved import revolved
+from tools.random_scenes.verifier import complaints
 
 STEEL = IsotropicElasticity(1.0, 0.3)
 ALONG, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])

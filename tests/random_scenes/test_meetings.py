@@ -1,6 +1,6 @@
 """Scenes in which features meet: the same turned, mirrored, in other units, numbered and cut otherwise.
 
-`python -m tests.random_scenes --kind meetings --count 500` judges as many as wanted.
+`python -m tools.random_scenes --kind meetings --count 500` judges as many as wanted.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from fenics_contact.results import ContactResult
-from tests.random_scenes import meetings_judge
-from tests.random_scenes.judge import GOOD, Outcome
-from tests.random_scenes.meetings import Meeting, Writing, meeting
-from tests.random_scenes.meetings_judge import judge_meeting
+from tools.random_scenes import meetings_judge
+from tools.random_scenes.judge import GOOD, Outcome
+from tools.random_scenes.meetings import Meeting, Writing, meeting
+from tools.random_scenes.meetings_judge import judge_meeting
 
 QUICK = [0, *range(2, 8)]
 #: Scenes that failed once: edges of periodic bodies whose meshes do not match; friction that is unloaded, and

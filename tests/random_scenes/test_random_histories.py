@@ -1,6 +1,6 @@
 """Random histories of large deformations: the same answer elsewhere, in other units and cut otherwise.
 
-`python -m tests.random_scenes --kind deformed --count 500` judges as many as wanted.
+`python -m tools.random_scenes --kind deformed --count 500` judges as many as wanted.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.results import ContactResult
-from tests.random_scenes import deformed_judge
-from tests.random_scenes.deformed import KINDS, history
-from tests.random_scenes.deformed_judge import judge_history
-from tests.random_scenes.frame import Frame
-from tests.random_scenes.judge import GOOD, Outcome
+from tools.random_scenes import deformed_judge
+from tools.random_scenes.deformed import KINDS, history
+from tools.random_scenes.deformed_judge import judge_history
+from tools.random_scenes.frame import Frame
+from tools.random_scenes.judge import GOOD, Outcome
 
 #: Short ones of two kinds; claims rest on one or two of each other kind, the slow tests on more of them.
 QUICK, CLAIMS, LONG = (9, 1), (25, 27, 28, 29, 115, 154), (13, 24, 26, 30, 31)
@@ -40,7 +40,7 @@ def test_a_random_history_is_the_same_written_and_cut_otherwise(seed: int) -> No
 def test_a_random_history_is_the_same_on_two_ranks_and_told_once(
     mpirun: Callable[..., str], tmp_path: Path
 ) -> None:
-    lines, run = tmp_path / "verdicts", "from tests.random_scenes.__main__ import main; main()"
+    lines, run = tmp_path / "verdicts", "from tools.random_scenes.__main__ import main; main()"
     given = f"--kind deformed --processes 0 --seeds {QUICK[1]} --output {lines}"
     told = mpirun(run, 2, *given.split())
     assert [json.loads(line)["outcome"] for line in lines.read_text().splitlines()] == ["solved"], told

@@ -1,13 +1,13 @@
 """Random scenes: every one solved and verified on whole bodies, or refused for a reason that holds.
 
-`python -m tests.random_scenes --count 1000` judges as many as wanted.
+`python -m tools.random_scenes --count 1000` judges as many as wanted.
 """
 
 from __future__ import annotations
 
 import pytest
 
-from tests.random_scenes.judge import GOOD, judge, judge_revolved
+from tools.random_scenes.judge import GOOD, judge, judge_revolved
 
 #: Scenes of many seconds, which claims rest on.
 LONG = {20_037, 20_076}

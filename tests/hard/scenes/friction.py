@@ -27,10 +27,10 @@ from fenics_contact.errors import InfeasibleError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from tests.equilibrium.gallery import SOFT, block_on_plane, pressed_block, stack
-from tests.hard.invariants import violations
 from tests.hard.scenes.parts import FLOOR, cubes, force
-from tests.hard.transform import turned
-from tests.hard.trial import Answer, Trial, cut_trial, failing_trial, trial
+from tools.hard_cases.invariants import violations
+from tools.hard_cases.transform import turned
+from tools.hard_cases.trial import Answer, Trial, cut_trial, failing_trial, trial
 
 GROUP = "friction"
 

@@ -12,8 +12,8 @@ from fenics_contact.gallery import block
 from fenics_contact.mesh import scaled_jacobian
 from fenics_contact.mesh.quality import jacobians
 from tests.equilibrium.gallery import SOFT, block_on_plane, crowned, two_blocks
-from tests.hard.transform import renumbered_mesh, turned
-from tests.hard.trial import Answer, Trial, bisected, cut_trial, trial
+from tools.hard_cases.transform import renumbered_mesh, turned
+from tools.hard_cases.trial import Answer, Trial, bisected, cut_trial, trial
 
 GROUP = "meshes"
 CELLS = ("hexahedron", "tetrahedron")

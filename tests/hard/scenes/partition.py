@@ -33,7 +33,7 @@ from tests.equilibrium.gallery import (
     pressed_block,
     two_blocks,
 )
-from tests.hard.trial import Trial, boxes, cut_trial, trial
+from tools.hard_cases.trial import Trial, boxes, cut_trial, trial
 
 GROUP = "partition"
 

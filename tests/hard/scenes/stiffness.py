@@ -30,7 +30,7 @@ from tests.equilibrium.contrast import FRICTION, Blocks, Regions
 from tests.equilibrium.gallery import crowned
 from tests.equilibrium.hertz import Hertz, errors
 from tests.hard.scenes.parts import FLOOR
-from tests.hard.trial import Trial, bisected, boxes, cut_trial, failing_trial, ragged, trial
+from tools.hard_cases.trial import Trial, bisected, boxes, cut_trial, failing_trial, ragged, trial
 
 GROUP = "stiffness"
 

@@ -6,8 +6,8 @@ from functools import partial
 
 from fenics_contact import Coulomb
 from tests.equilibrium.gallery import two_blocks
-from tests.hard.transform import in_units
-from tests.hard.trial import Answer, Trial, cut_trial, trial
+from tools.hard_cases.transform import in_units
+from tools.hard_cases.trial import Answer, Trial, cut_trial, trial
 
 GROUP = "units"
 #: What is one of the gallery's lengths and forces: blocks of metres, moduli of 100 and 300 GPa.

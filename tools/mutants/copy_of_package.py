@@ -15,7 +15,7 @@ from fenics_contact import clean_environment
 
 ROOT = Path(__file__).parents[2]
 #: What the tests of a mutation need.
-PARTS = ("fenics_contact", "tests", "benchmarks", "demos", "pyproject.toml", "scripts")
+PARTS = ("fenics_contact", "tests", "tools", "benchmarks", "demos", "pyproject.toml", "scripts")
 #: Seconds that the tests of one mutation may take.
 TIMEOUT = 900.0
 #: What pytest's exit status means.

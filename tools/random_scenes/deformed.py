@@ -35,7 +35,7 @@ from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import rectangle
 from fenics_contact.mesh import bisection_partition
-from tests.random_scenes.deformed_parts import (
+from tools.random_scenes.deformed_parts import (
     any_material,
     friction_law,
     metal,
@@ -47,8 +47,8 @@ from tests.random_scenes.deformed_parts import (
     stages,
     vector,
 )
-from tests.random_scenes.dice import Dice
-from tests.random_scenes.frame import Frame
+from tools.random_scenes.dice import Dice
+from tools.random_scenes.frame import Frame
 
 Built = tuple[Scene, list[LoadStep]]
 

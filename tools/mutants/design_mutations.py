@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.mutants.copy_of_package import Mutation
+from tools.mutants.copy_of_package import Mutation
 
 GIVEN = "tests/design/test_given_gap_sensitivity.py"
 MERIT, NONLINEAR = "tests/optimize/test_bundle.py", "tests/optimize/test_nonlinear.py"

@@ -32,7 +32,7 @@ from fenics_contact.gallery import rectangle_lattice
 from fenics_contact.materials import PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.mesh.faces import boundary_faces
-from tests.random_scenes.dice import Dice
+from tools.random_scenes.dice import Dice
 
 #: Coordinates of mesh lines along an axis, from those of blocks.
 Ticks = Callable[[np.ndarray], np.ndarray]

@@ -10,7 +10,7 @@ import numpy as np
 from fenics_contact import BodyMesh, ContactPair, RigidCylinder, RigidPlane, RigidSphere, Surface
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.obstacles import RigidObstacle
-from tests.random_scenes.whole import Whole, surface_area
+from tools.random_scenes.whole import Whole, surface_area
 
 #: What rounding may do beside the coordinates, and beside the size of what lies about a point.
 ROUNDING, EXACT = 64 * np.finfo(float).eps, 1e-8

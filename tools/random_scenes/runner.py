@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import IO
 
 from fenics_contact import clean_environment
-from tests.random_scenes.corner_intervals import judge_corners
-from tests.random_scenes.deformed_judge import judge_history
-from tests.random_scenes.intervals import judge_interval
-from tests.random_scenes.judge import Outcome, Verdict, judge, judge_revolved
-from tests.random_scenes.meetings_judge import judge_meeting
+from tools.random_scenes.corner_intervals import judge_corners
+from tools.random_scenes.deformed_judge import judge_history
+from tools.random_scenes.intervals import judge_interval
+from tools.random_scenes.judge import Outcome, Verdict, judge, judge_revolved
+from tools.random_scenes.meetings_judge import judge_meeting
 
 ROOT = Path(__file__).parents[2]
 #: A process that waits and computes nothing hangs, too, if it does so for this many times the limit.
@@ -115,7 +115,7 @@ class _Worker:
     """A process that judges one scene after another."""
 
     def __init__(self, kind: str) -> None:
-        command = [sys.executable, "-m", "tests.random_scenes", "--worker", "--kind", kind]
+        command = [sys.executable, "-m", "tools.random_scenes", "--worker", "--kind", kind]
         self._process = subprocess.Popen(
             command,
             cwd=ROOT,

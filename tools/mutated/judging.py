@@ -15,8 +15,8 @@ from pathlib import Path
 from mpi4py import MPI
 
 from fenics_contact import _cli as cli
-from tests.mutated.spoiling import spoilt_bytes, spoilt_text
-from tests.mutated.subjects import SUBJECTS
+from tools.mutated.spoiling import spoilt_bytes, spoilt_text
+from tools.mutated.subjects import SUBJECTS
 
 #: Commands end with 0, or with the code of input that cannot be used, with one line that says why.
 EXPECTED = (0, int(cli.ExitCode.WRONG_INPUT))

@@ -13,9 +13,9 @@ from mpi4py import MPI
 from fenics_contact import ContactProblem, DeformedState, State, solve_steps
 from fenics_contact.errors import ConvergenceError, FenicsContactError, InfeasibleError
 from tests.hard.deformed.case import violations
-from tests.random_scenes.deformed import History, cut, history
-from tests.random_scenes.frame import Frame
-from tests.random_scenes.judge import Outcome, Verdict
+from tools.random_scenes.deformed import History, cut, history
+from tools.random_scenes.frame import Frame
+from tools.random_scenes.judge import Outcome, Verdict
 
 #: Relative differences of displacements and of forces between twins, solved to the default tolerance.
 AGREE, FORCES = 1e-5, 1e-4

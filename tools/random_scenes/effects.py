@@ -19,8 +19,8 @@ from fenics_contact import (
     Scene,
     Tresca,
 )
-from tests.random_scenes.dice import Dice
-from tests.random_scenes.whole import on_axis
+from tools.random_scenes.dice import Dice
+from tools.random_scenes.whole import on_axis
 
 #: Seeds of what is added lie so far from those of the scenes, which stay what they are without it.
 APART = 2**32

@@ -20,8 +20,8 @@ from fenics_contact import (
 )
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pairs import Friction
-from tests.random_scenes.bodies import Grown, box, in_plane, round_body
-from tests.random_scenes.dice import Dice
+from tools.random_scenes.bodies import Grown, box, in_plane, round_body
+from tools.random_scenes.dice import Dice
 
 
 @dataclass

@@ -42,8 +42,8 @@ from fenics_contact._scene.pairs import Friction
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from tests.hard.transform import renumbered_mesh, turned_mesh
-from tests.random_scenes.dice import Dice
+from tools.hard_cases.transform import renumbered_mesh, turned_mesh
+from tools.random_scenes.dice import Dice
 
 Numbers = Sequence[float | None]
 Built = tuple[Scene, list[LoadStep]]

@@ -18,8 +18,8 @@ from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.objective import Objective
 from fenics_contact.errors import ConvergenceError, FenicsContactError
 from fenics_contact.results.state import State
-from tests.random_scenes.generator import sample
-from tests.random_scenes.judge import Outcome, Verdict, placed
+from tools.random_scenes.generator import sample
+from tools.random_scenes.judge import Outcome, Verdict, placed
 
 QUANTITIES = (
     "peak_pressure", "contact_force", "displacement", "potential", "effective_area", "reaction",

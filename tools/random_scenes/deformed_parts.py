@@ -21,8 +21,8 @@ from fenics_contact.materials import (
     StVenantKirchhoff,
 )
 from fenics_contact.mesh import boundary_faces, quadratic
-from tests.random_scenes.dice import Dice
-from tests.random_scenes.frame import Frame
+from tools.random_scenes.dice import Dice
+from tools.random_scenes.frame import Frame
 
 Made = Callable[[Frame], Material]
 

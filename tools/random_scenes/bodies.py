@@ -19,7 +19,7 @@ from fenics_contact.materials import (
     material_axes,
 )
 from fenics_contact.mesh import quadratic
-from tests.random_scenes.dice import Dice
+from tools.random_scenes.dice import Dice
 
 #: Cells along a side, hardly ever a power of two.
 COUNTS = {1: 1.0, 2: 1.5, 3: 3.0, 4: 0.5, 5: 2.0, 7: 1.0}

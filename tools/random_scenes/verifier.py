@@ -19,9 +19,9 @@ from fenics_contact import (
 )
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact.results.deformed_state import AnyState
-from tests.random_scenes.generator import Sample
-from tests.random_scenes.kinematics import misplaced
-from tests.random_scenes.whole import Whole, rigid_motions
+from tools.random_scenes.generator import Sample
+from tools.random_scenes.kinematics import misplaced
+from tools.random_scenes.whole import Whole, rigid_motions
 
 #: Below this part of what cancels a figure is rounding.
 ROUNDING = 1e-13

@@ -1,6 +1,6 @@
-"""Judge random scenes: ``python -m tests.random_scenes --count 1000 --first 0``.
+"""Judge random scenes: ``python -m tools.random_scenes --count 1000 --first 0``.
 
-``scripts/launch.sh 2 python -m tests.random_scenes --kind deformed --processes 0`` solves twins on two ranks.
+``scripts/launch.sh 2 python -m tools.random_scenes --kind deformed --processes 0`` solves twins on two ranks.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from tests.random_scenes.judge import GOOD, Verdict
-from tests.random_scenes.runner import JUDGES, judged, table, work
+from tools.random_scenes.judge import GOOD, Verdict
+from tools.random_scenes.runner import JUDGES, judged, table, work
 
 
 def main() -> int:

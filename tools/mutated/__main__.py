@@ -1,4 +1,4 @@
-"""Spoil files and plan them: ``python -m tests.mutated --count 2000``."""
+"""Spoil files and plan them: ``python -m tools.mutated --count 2000``."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from tests.mutated.judging import judged
-from tests.mutated.subjects import SUBJECTS
+from tools.mutated.judging import judged
+from tools.mutated.subjects import SUBJECTS
 
 
 def main() -> int:

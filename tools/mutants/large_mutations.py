@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.mutants.copy_of_package import Mutation
+from tools.mutants.copy_of_package import Mutation
 
 ONE_STEP = (
     "tests/large_deformations/test_newton_steps.py::"

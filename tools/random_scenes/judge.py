@@ -13,10 +13,10 @@ from mpi4py import MPI
 
 from fenics_contact import solve_scene
 from fenics_contact.errors import ConvergenceError, FenicsContactError
-from tests.random_scenes.generator import Sample, sample
-from tests.random_scenes.refusals import unjust
-from tests.random_scenes.revolved import revolved
-from tests.random_scenes.verifier import complaints
+from tools.random_scenes.generator import Sample, sample
+from tools.random_scenes.refusals import unjust
+from tools.random_scenes.revolved import revolved
+from tools.random_scenes.verifier import complaints
 
 
 class Outcome(StrEnum):

@@ -17,10 +17,10 @@ from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import FenicsContactError, InfeasibleError, InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.feti.torn import with_points
-from tests.random_scenes.generator import Sample
-from tests.random_scenes.kinematics import Side, above, own_distance
-from tests.random_scenes.verifier import loose, moving
-from tests.random_scenes.whole import Whole, on_axis, rigid_motions
+from tools.random_scenes.generator import Sample
+from tools.random_scenes.kinematics import Side, above, own_distance
+from tools.random_scenes.verifier import loose, moving
+from tools.random_scenes.whole import Whole, on_axis, rigid_motions
 
 #: Corners of the polygon that stands for the disc of friction, inside of it.
 CORNERS = 16

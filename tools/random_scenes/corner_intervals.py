@@ -11,8 +11,8 @@ from mpi4py import MPI
 from fenics_contact._adaptive.levels import Limits, solve_to
 from fenics_contact._adaptive.quantities import quantity
 from fenics_contact.errors import ConvergenceError, FenicsContactError
-from tests.random_scenes.corners import Corners, corners
-from tests.random_scenes.judge import Outcome, Verdict, placed
+from tools.random_scenes.corners import Corners, corners
+from tools.random_scenes.judge import Outcome, Verdict, placed
 
 #: Accuracies that are asked for.
 ACCURACIES = (0.1, 0.05, 0.02, 0.01)

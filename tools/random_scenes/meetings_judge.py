@@ -12,8 +12,8 @@ from mpi4py import MPI
 from fenics_contact import ContactProblem, Scene, State, solve_steps
 from fenics_contact.errors import ConvergenceError, FenicsContactError
 from fenics_contact.mesh import bisection_partition
-from tests.random_scenes.judge import Outcome, Verdict, placed
-from tests.random_scenes.meetings import Meeting, Writing, meeting
+from tools.random_scenes.judge import Outcome, Verdict, placed
+from tools.random_scenes.meetings import Meeting, Writing, meeting
 
 #: Relative differences of displacements and of forces, and forces out of balance, at a tolerance of 1e-9.
 AGREE, FORCES, BALANCE = 1e-5, 1e-4, 1e-6

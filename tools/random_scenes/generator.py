@@ -34,12 +34,12 @@ from fenics_contact._scene.loads import Load
 from fenics_contact.materials import OrthotropicElasticity, OrthotropicPlaneStress
 from fenics_contact.materials.elastic import can_expand
 from fenics_contact.mesh import bisection_partition
-from tests.hard.transform import in_units
-from tests.random_scenes.arrangements import ARRANGEMENTS, Arrangement
-from tests.random_scenes.bodies import body, with_surface
-from tests.random_scenes.dice import Dice
-from tests.random_scenes.effects import may_be_oblique, with_effects
-from tests.random_scenes.whole import on_axis
+from tools.hard_cases.transform import in_units
+from tools.random_scenes.arrangements import ARRANGEMENTS, Arrangement
+from tools.random_scenes.bodies import body, with_surface
+from tools.random_scenes.dice import Dice
+from tools.random_scenes.effects import may_be_oblique, with_effects
+from tools.random_scenes.whole import on_axis
 
 #: Weights of tolerances: the default, a number as for derivatives, and a small one.
 TOLERANCES = {None: 6.0, 1e-6: 2.5, 1e-8: 1.5}

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tests.mutants.copy_of_package import Mutation
-from tests.mutants.design_mutations import DESIGN_MUTATIONS, GIVEN
-from tests.mutants.large_mutations import LARGE_MUTATIONS
-from tests.mutants.unseen_mutations import UNSEEN_MUTATIONS
+from tools.mutants.copy_of_package import Mutation
+from tools.mutants.design_mutations import DESIGN_MUTATIONS, GIVEN
+from tools.mutants.large_mutations import LARGE_MUTATIONS
+from tools.mutants.unseen_mutations import UNSEEN_MUTATIONS
 
 CONIC = (
     "tests/equilibrium/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"

@@ -26,7 +26,7 @@ from fenics_contact.errors import ConvergenceError
 from fenics_contact.mesh import bisection_partition
 from fenics_contact.qp import DualSolver, FaceNewton
 from fenics_contact.qp.solution import SolverStep
-from tests.hard.transform import in_units, steps_in_units
+from tools.hard_cases.transform import in_units, steps_in_units
 
 Cut = Mapping[str, np.ndarray]
 TOLERANCE = 1e-9

@@ -19,12 +19,12 @@ from fenics_contact import (
 )
 from fenics_contact._scene.loads import Load
 from fenics_contact.materials import IsotropicElasticity, Material, OrthotropicElasticity
-from tests.hard.transform import in_units
-from tests.random_scenes.arrangements import ARRANGEMENTS, Arrangement
-from tests.random_scenes.bodies import RATIOS, in_halves, in_plane
-from tests.random_scenes.dice import Dice
-from tests.random_scenes.effects import is_axis, with_effects
-from tests.random_scenes.generator import TOLERANCES, Sample, cut, loads, moved, supported
+from tools.hard_cases.transform import in_units
+from tools.random_scenes.arrangements import ARRANGEMENTS, Arrangement
+from tools.random_scenes.bodies import RATIOS, in_halves, in_plane
+from tools.random_scenes.dice import Dice
+from tools.random_scenes.effects import is_axis, with_effects
+from tools.random_scenes.generator import TOLERANCES, Sample, cut, loads, moved, supported
 
 
 def revolved(seed: int) -> Sample:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.mutants.copy_of_package import Mutation
+from tools.mutants.copy_of_package import Mutation
 
 RESIDUALS = "tests/adaptive/test_contact_residuals.py"
 ALIKE = "tests/feti/test_alike.py::test_stiffnesses_that_agree_in_diagonal_trace_and_norm_alone_are_not_alike"
