@@ -62,7 +62,8 @@ test: lint ## Check style and types, run the quick tests and the quick benchmark
 	$(quick)
 	$(python) -m benchmarks --quick
 
-core := tests/dolfinx $(addprefix tests/equilibrium/test_, patch.py coulomb.py hertz.py quadratic_cells.py ranks.py) \
+core := tests/dolfinx $(addprefix tests/pairing/test_, patch.py quadratic_cells.py) \
+  $(addprefix tests/equilibrium/test_, coulomb.py hertz.py ranks.py) \
   tests/design/test_adjoint.py tests/design/test_derivatives.py tests/materials/test_hyperelasticity.py \
   tests/large_deformations/test_sliding.py $(addprefix tests/readers/test_, dolfinx_import.py meshio_import.py \
   gmsh_import.py) tests/house/test_starting.py

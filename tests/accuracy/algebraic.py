@@ -33,8 +33,9 @@ from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual
-from tests.equilibrium import effect_cases, gallery
-from tests.equilibrium.gallery import FLOOR, SOFT
+from tests import scenes
+from tests.equilibrium import effect_cases
+from tests.scenes import FLOOR, SOFT
 
 Cut = Callable[[Scene], Mapping[str, np.ndarray]]
 
@@ -119,14 +120,14 @@ CASES = {
     "a linear block": Case(clamped, graph(5)),
     "prescribed displacements": Case(stretched, boxes(2, 2, 1)),
     "a ball on a plane": Case(ball, bisected(4)),
-    "a frictionless pair": Case(lambda: gallery.guided(gallery.two_blocks(None), "upper"), boxes(2, 1, 2)),
-    "Tresca's law": Case(lambda: gallery.two_blocks(Tresca(0.8)), boxes(2, 2, 1)),
-    "Coulomb's law": Case(lambda: gallery.pressed_block(Coulomb(0.3)), boxes(3, 1, 1)),
-    "a body that friction holds": Case(lambda: gallery.two_blocks(Coulomb(0.38)), boxes(2, 1, 1)),
+    "a frictionless pair": Case(lambda: scenes.guided(scenes.two_blocks(None), "upper"), boxes(2, 1, 2)),
+    "Tresca's law": Case(lambda: scenes.two_blocks(Tresca(0.8)), boxes(2, 2, 1)),
+    "Coulomb's law": Case(lambda: scenes.pressed_block(Coulomb(0.3)), boxes(3, 1, 1)),
+    "a body that friction holds": Case(lambda: scenes.two_blocks(Coulomb(0.38)), boxes(2, 1, 1)),
     "bodies that float on each other": Case(
-        lambda: gallery.stack(Coulomb(0.4), Coulomb(0.5)), boxes(2, 1, 1)
+        lambda: scenes.stack(Coulomb(0.4), Coulomb(0.5)), boxes(2, 1, 1)
     ),
-    "nodes in two pairs": Case(lambda: gallery.cornered_block(Coulomb(0.3)), boxes(2, 1, 1)),
+    "nodes in two pairs": Case(lambda: scenes.cornered_block(Coulomb(0.3)), boxes(2, 1, 1)),
     "a mortar pair": Case(effect_cases.mortar, graph(4)),
     # What is left between parts of the stiff body the preconditioner closes at ten times the least energy.
     "a stiff body on a soft one": Case(effect_cases.stiff_on_soft, graph(4), factor=15.0),

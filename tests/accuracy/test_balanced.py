@@ -24,9 +24,10 @@ from fenics_contact.gallery import block
 from fenics_contact.qp import DualProblem, DualSolution, FaceNewton, Start
 from fenics_contact.results import BalancedTolerance, SolverErrors
 from fenics_contact.results.deformed_state import AnyState
+from tests import scenes
 from tests.accuracy.algebraic import CASES, measured
-from tests.equilibrium import effect_cases, gallery
-from tests.equilibrium.gallery import SOFT
+from tests.equilibrium import effect_cases
+from tests.scenes import SOFT
 
 PAIR = "a body that friction holds"
 MODEST = ["a linear block", "a ball on a plane", "Tresca's law", PAIR, "a mortar pair", "two dimensions"]
@@ -236,7 +237,7 @@ def test_a_tolerance_lies_between_zero_and_one(tolerance: float) -> None:
 
 
 def test_a_tolerance_is_a_number_or_balanced() -> None:
-    scene = gallery.block_on_plane(Coulomb(0.6))
+    scene = scenes.block_on_plane(Coulomb(0.6))
     with pytest.raises(InvalidInputError, match=r"a number, BalancedTolerance\(...\) or None, got str"):
         solve_scene(scene, MPI.COMM_SELF, tolerance="balanced")  # type: ignore[arg-type]
 

@@ -35,8 +35,8 @@ from fenics_contact.materials import PlaneStrain
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual
+from tests import scenes
 from tests.accuracy.algebraic import CASES, Measured, clamped, energy_norm, measured, solved
-from tests.equilibrium import gallery
 
 
 def assert_certified(found: Measured, factor: float = 10.0) -> None:
@@ -73,16 +73,16 @@ def test_the_bound_is_near_the_error_at_every_tolerance(name: str, tolerance: fl
 
 
 def state_of(scene: Scene, solver: DualSolver, boxes: tuple[int, int, int] = (2, 1, 1)) -> Measured:
-    state = solve_scene(scene, MPI.COMM_SELF, partitions=gallery.partitions(scene, boxes), solver=solver)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=scenes.partitions(scene, boxes), solver=solver)
     return measured(state)
 
 
 @pytest.mark.parametrize(
     ("scene", "solver"),
     [
-        (gallery.block_on_plane(Coulomb(0.6)), Smalse(tolerance=1e-3)),
-        (gallery.two_blocks(Tresca(0.8)), Smalse(tolerance=1e-3)),
-        (gallery.pressed_block(Coulomb(0.3)), FixedPoint(FaceNewton(tolerance=1e-3))),
+        (scenes.block_on_plane(Coulomb(0.6)), Smalse(tolerance=1e-3)),
+        (scenes.two_blocks(Tresca(0.8)), Smalse(tolerance=1e-3)),
+        (scenes.pressed_block(Coulomb(0.3)), FixedPoint(FaceNewton(tolerance=1e-3))),
     ],
     ids=["SMALSE with a floating body", "SMALSE", "two loops"],
 )
@@ -95,7 +95,7 @@ def test_answers_out_of_balance_and_outside_the_cone_are_certified(scene: Scene,
 @pytest.mark.parametrize("reserve", [1e-1, 1e-3, 1e-6])
 def test_a_load_that_friction_just_resists_is_certified(reserve: float) -> None:
     push = np.hypot(1.0, 0.3)  # on as much area as the floor
-    scene = gallery.block_on_plane(Tresca((1.0 + reserve) * push))
+    scene = scenes.block_on_plane(Tresca((1.0 + reserve) * push))
     found = state_of(scene, FaceNewton(tolerance=1e-4))
     known = found.certificate.known.statuses
     assert np.count_nonzero(known.slip) > np.count_nonzero(known.stick)
@@ -104,14 +104,14 @@ def test_a_load_that_friction_just_resists_is_certified(reserve: float) -> None:
 
 @pytest.mark.parametrize("boxes", [(1, 1, 1), (3, 1, 1), (2, 3, 2), (6, 3, 1)])
 def test_every_partition_is_certified(boxes: tuple[int, int, int]) -> None:
-    found = state_of(gallery.block_on_plane(Coulomb(0.6)), FaceNewton(tolerance=1e-3), boxes)
+    found = state_of(scenes.block_on_plane(Coulomb(0.6)), FaceNewton(tolerance=1e-3), boxes)
     assert np.count_nonzero(found.certificate.known.statuses.closed) > 0
     assert_certified(found)
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e9])
 def test_the_bound_scales_with_the_unit_of_force(unit: float) -> None:
-    scene = gallery.two_blocks(Coulomb(0.38))
+    scene = scenes.two_blocks(Coulomb(0.38))
     bodies = {
         name: replace(body, material=replace(body.material, young_modulus=unit * body.material.young_modulus))
         for name, body in scene.bodies.items()
@@ -251,14 +251,14 @@ def test_friction_that_falls_short_of_its_bound_does_less_work(
 @pytest.mark.parametrize(
     ("scene", "solver"),
     [
-        (gallery.two_blocks(Coulomb(2.0)), FaceNewton(tolerance=1e-3)),
-        (gallery.pressed_block(Coulomb(1.0), push=0.1), FixedPoint(FaceNewton(tolerance=1e-2))),
+        (scenes.two_blocks(Coulomb(2.0)), FaceNewton(tolerance=1e-3)),
+        (scenes.pressed_block(Coulomb(1.0), push=0.1), FixedPoint(FaceNewton(tolerance=1e-2))),
     ],
     ids=["one loop", "two loops"],
 )
 def test_the_estimate_by_the_law_of_friction_is_needed(scene: Scene, solver: FaceNewton | FixedPoint) -> None:
     """What separates a state from Coulomb's law may be more than the bound at its own slip bounds."""
-    state = solve_scene(scene, MPI.COMM_SELF, partitions=gallery.partitions(scene), solver=solver)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=scenes.partitions(scene), solver=solver)
     found = measured(state)
     assert found.error <= found.bound
     assert found.bound < found.whole <= found.bound + found.friction
@@ -338,9 +338,9 @@ def test_given_slip_bounds_are_never_raised() -> None:
 def test_slip_bounds_that_follow_normal_forces_are_raised_where_these_are_too_weak() -> None:
     """Friction holds the block by a thousandth, the solver knows normal forces to a tenth."""
     resisted = np.hypot(1.0, 0.3) / 2.0
-    scene = gallery.block_on_plane(Coulomb(1.001 * resisted))
+    scene = scenes.block_on_plane(Coulomb(1.001 * resisted))
     state = solve_scene(
-        scene, MPI.COMM_SELF, partitions=gallery.partitions(scene), solver=FixedPoint(Smalse(tolerance=0.1))
+        scene, MPI.COMM_SELF, partitions=scenes.partitions(scene), solver=FixedPoint(Smalse(tolerance=0.1))
     )
     system, solution = state.dual, state.dual_solution
     found = certify(system, solution)
@@ -359,9 +359,9 @@ def test_slip_bounds_that_follow_normal_forces_are_raised_where_these_are_too_we
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-2])
 def test_friction_that_just_resists_is_balanced_within_given_bounds(reserve: float, tolerance: float) -> None:
     """The set of admissible multipliers is narrow; SMALSE's own are out of balance."""
-    scene = gallery.block_on_plane(Tresca((1.0 + reserve) * np.hypot(1.0, 0.3)))
+    scene = scenes.block_on_plane(Tresca((1.0 + reserve) * np.hypot(1.0, 0.3)))
     state = solve_scene(
-        scene, MPI.COMM_SELF, partitions=gallery.partitions(scene), solver=Smalse(tolerance=tolerance)
+        scene, MPI.COMM_SELF, partitions=scenes.partitions(scene), solver=Smalse(tolerance=tolerance)
     )
     found = measured(state)
     known = found.certificate.known

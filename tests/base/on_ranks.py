@@ -15,7 +15,7 @@ from fenics_contact._base import sparse as shared_factor
 from fenics_contact._base.sparse import SharedFactor
 from fenics_contact.qp import FaceNewton, coarse
 from fenics_contact.qp.coarse import SparseGramInverse
-from tests.equilibrium.gallery import partitions, two_blocks
+from tests.scenes import partitions, two_blocks
 
 
 def factor_errors(comm: MPI.Comm) -> dict[str, float]:

@@ -24,7 +24,7 @@ from fenics_contact.gallery import DesignSurface, block
 from fenics_contact.materials import IsotropicElasticity
 from tests.design.chains import SOLVER
 from tests.design.quotients import Remembering
-from tests.equilibrium.gallery import FLOOR, Friction, crowned, partitions
+from tests.scenes import FLOOR, Friction, crowned, partitions
 
 RUBBER, PLASTIC = IsotropicElasticity(100.0, 0.3), IsotropicElasticity(300.0, 0.2)
 

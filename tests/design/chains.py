@@ -29,7 +29,7 @@ from fenics_contact.gallery.links import PULL_AXIS
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.qp import FaceNewton
 from tests.design.quotients import Line, Remembering
-from tests.equilibrium.gallery import Friction
+from tests.scenes import Friction
 
 #: Tight enough for difference quotients with steps of 1e-5.
 SOLVER = FaceNewton(tolerance=1e-11)

@@ -20,7 +20,7 @@ from fenics_contact.design.base import DesignFunction
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results import ContactResult
 from tests.design.blocks import block_on_floor, designs_of
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 BOUND = 0.02
 #: Largest normal force of a node relative to that of the reference shape, at most.

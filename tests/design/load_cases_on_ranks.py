@@ -11,7 +11,7 @@ from fenics_contact import ContactProblem, Coulomb, LoadStep, ShapeProblem, Trac
 from fenics_contact.design import LoadCases, TotalPotential
 from tests.design.blocks import block_on_block, designs_of
 from tests.design.chains import SOLVER
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 WEIGHTS = {"pressed": 1.0, "dragged": 2.0, "rough": -0.5}
 

@@ -28,7 +28,7 @@ from tests.design.chains import SOLVER
 from tests.design.mortar_lines import by_mortar
 from tests.design.plane_blocks import on_block, on_obstacle
 from tests.design.quotients import Way
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 Steps = Sequence[tuple[str, tuple[float, ...]]]
 #: Loads on the top of plane blocks: pressed, pushed until some points slip, pulled back, half unloaded.

@@ -31,7 +31,7 @@ from tests.design.objectives import objectives
 from tests.design.plane_blocks import FLOOR as GROUND
 from tests.design.plane_blocks import line_of
 from tests.design.quotients import Line
-from tests.equilibrium.gallery import FLOOR, crowned
+from tests.scenes import FLOOR, crowned
 
 
 def _mesh(cell: str, order: int) -> BodyMesh:

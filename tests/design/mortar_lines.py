@@ -20,7 +20,7 @@ from tests.design.moved_blocks import DRAG
 from tests.design.objectives import objectives
 from tests.design.plane_blocks import line_of, on_block
 from tests.design.quotients import Line, Remembering
-from tests.equilibrium.gallery import crowned
+from tests.scenes import crowned
 
 
 def by_mortar(scene: Scene, **more: Any) -> Scene:

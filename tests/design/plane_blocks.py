@@ -33,7 +33,7 @@ from tests.design.aims import aims
 from tests.design.chains import SOLVER
 from tests.design.objectives import objectives
 from tests.design.quotients import Line, Remembering
-from tests.equilibrium.gallery import Friction, crowned, partitions
+from tests.scenes import Friction, crowned, partitions
 
 RUBBER, PLASTIC = PlaneStrain(100.0, 0.3), PlaneStress(300.0, 0.2)
 FLOOR = RigidPlane((0.0, 0.0), (0.0, 1.0))

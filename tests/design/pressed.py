@@ -14,7 +14,7 @@ from fenics_contact.gallery import block
 from fenics_contact.results import ContactResult
 from tests.design.blocks import RUBBER, problem
 from tests.design.quotients import Line, Remembering
-from tests.equilibrium.gallery import FLOOR, Friction, crowned
+from tests.scenes import FLOOR, Friction, crowned
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from tests.design.blocks import PLASTIC, RUBBER
 from tests.design.objectives import objectives
 from tests.design.plane_blocks import line_of, on_block, on_obstacle
 from tests.design.quotients import Line
-from tests.equilibrium.gallery import FLOOR, Friction, crowned
+from tests.scenes import FLOOR, Friction, crowned
 
 
 def on_floor(friction: Friction, cell: str) -> Scene:

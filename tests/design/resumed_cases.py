@@ -24,7 +24,7 @@ from fenics_contact.design import (
 from tests.design.blocks import block_on_floor, designs_of
 from tests.design.chains import BOXES, chain, chain_designs
 from tests.design.objectives import normal_forces
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 #: Loose, so that states depend on where they are started from; the block's follow the optimiser.
 TOLERANCES: dict[str, float | AdaptiveTolerance] = {"block": AdaptiveTolerance(), "chain": 1e-5}

@@ -24,7 +24,7 @@ from fenics_contact.design import BundleTrust, ContactForces, Result
 from fenics_contact.gallery import DesignSurface, block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.results import ContactResult
-from tests.equilibrium.gallery import FLOOR, Friction, partitions
+from tests.scenes import FLOOR, Friction, partitions
 
 Array = np.ndarray
 BOUND = 0.01

@@ -51,7 +51,7 @@ from tests.design import moved_blocks
 from tests.design.blocks import RUBBER, block_on_floor, problem
 from tests.design.objectives import objectives
 from tests.design.quotients import Remembering
-from tests.equilibrium.gallery import FLOOR, crowned
+from tests.scenes import FLOOR, crowned
 
 #: Of force and length in those of the numbers below; the last one's stresses are of the order 1e40.
 UNITS = {"N and mm": (1.0, 1.0), "N and m": (1.0, 1e-3), "tiny": (1e20, 1e-10)}

@@ -33,7 +33,7 @@ from fenics_contact.errors import InvalidInputError
 from tests.design.chains import SOLVER
 from tests.design.load_paths import PathLine, beam, line_of, path_of
 from tests.design.quotients import Patch
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 CLAIM = [pytest.mark.slow, pytest.mark.claim]
 SCENES = [

@@ -51,7 +51,7 @@ from tests.design.constrained_blocks import BOUND, largest_force, posed
 from tests.design.constrained_blocks import FORCE as CONSTRAINED_FORCE
 from tests.design.constrained_blocks import minimised as minimised_constrained
 from tests.design.objectives import normal_forces
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 METHOD = BundleTrust(max_evaluations=15)
 

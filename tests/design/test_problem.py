@@ -19,7 +19,7 @@ from tests.design.blocks import block_on_block, designs_of, problem, side
 from tests.design.chains import SOLVER
 from tests.design.objectives import misfit, objectives
 from tests.design.quotients import Remembering
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 
 @cache

@@ -17,7 +17,7 @@ from tests.design.blocks import block_on_block, designs_of, problem
 from tests.design.chains import SOLVER
 from tests.design.objectives import objectives
 from tests.design.quotients import Line, Patch, Remembering
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 OBJECTIVES = {**objectives("upper"), **aims("upper", "z0")}
 #: Which body's surface is rigid, the other one being held.

@@ -15,7 +15,7 @@ from fenics_contact.design import TotalPotential
 from tests.design.chains import SOLVER
 from tests.design.plane_blocks import OBJECTIVES, on_block, on_obstacle
 from tests.design.quotients import Line, Remembering
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 
 def in_two(scene: Scene) -> Scene:

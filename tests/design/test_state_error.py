@@ -34,7 +34,7 @@ from tests.design.objectives import objectives
 from tests.design.pressed import DESIGN, SWITCHES
 from tests.design.quotients import Remembering
 from tests.design.resumed_cases import BOUND, minimised, posed
-from tests.equilibrium.gallery import FLOOR, Friction, crowned, partitions
+from tests.scenes import FLOOR, Friction, crowned, partitions
 
 LOOSE, EXACT = (1e-2, 1e-3, 1e-4), 1e-11
 SEEDS = range(2)

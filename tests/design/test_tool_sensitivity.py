@@ -22,7 +22,7 @@ from fenics_contact.gallery import block
 from tests.design.blocks import RUBBER, problem
 from tests.design.objectives import objectives
 from tests.design.quotients import Line, check_adjoint, check_statuses
-from tests.equilibrium.gallery import crowned
+from tests.scenes import crowned
 
 #: Many states: what claims rest on.
 pytestmark = [pytest.mark.slow, pytest.mark.claim]

@@ -46,7 +46,7 @@ from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.results import ContactResult
 from tests.design.blocks import side
 from tests.design.objectives import friction_forces, normal_forces
-from tests.equilibrium.gallery import crowned, partitions
+from tests.scenes import crowned, partitions
 
 Array = np.ndarray
 

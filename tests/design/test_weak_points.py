@@ -37,7 +37,7 @@ from tests.design.objectives import objectives
 from tests.design.pressed import DESIGN, SWITCHES, Pressed, line
 from tests.design.quotients import Line
 from tests.design.several_weak import BOUND, collect, minimised, posed
-from tests.equilibrium.gallery import Friction, partitions, two_blocks
+from tests.scenes import Friction, partitions, two_blocks
 
 #: Weak contacts, weak discs.
 COUNTS = {"closing, frictionless": (1, 0), "closing with friction": (1, 0), "slipping": (0, 1)}

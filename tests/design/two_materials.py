@@ -20,7 +20,7 @@ from fenics_contact import (
 )
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, OrthotropicElasticity
-from tests.equilibrium.gallery import FLOOR, crowned
+from tests.scenes import FLOOR, crowned
 
 WOOD = OrthotropicElasticity(
     (90.0, 60.0, 80.0), (0.2, 0.3, 0.25), (30.0, 35.0, 25.0), thermal_expansion=(1e-3, 2e-3, 0.0)

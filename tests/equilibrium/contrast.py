@@ -11,7 +11,7 @@ from fenics_contact import Body, BodyMesh, ContactPair, Coulomb, RigidPlane, Sce
 from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from tests.equilibrium.gallery import crowned
+from tests.scenes import crowned
 
 #: Cells along an edge of a block, which is cut into 2 x 2 x 2 subdomains.
 CELLS = 6

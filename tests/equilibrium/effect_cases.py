@@ -34,7 +34,7 @@ from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG
-from tests.equilibrium.gallery import two_blocks
+from tests.scenes import two_blocks
 
 TOLERANCE = 1e-10
 STEEL = IsotropicElasticity(1000.0, 0.3, thermal_expansion=1e-3)

@@ -7,7 +7,7 @@ import sys
 from mpi4py import MPI
 
 from fenics_contact import ContactProblem, Coulomb
-from tests.equilibrium.gallery import partitions, two_blocks
+from tests.scenes import partitions, two_blocks
 
 
 def main(comm: MPI.Comm) -> None:

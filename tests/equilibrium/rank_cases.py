@@ -16,7 +16,7 @@ from fenics_contact.gallery import block
 from fenics_contact.mesh import bisection_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results.deformed_state import AnyState
-from tests.equilibrium.gallery import SOFT, block_on_plane, partitions, two_blocks
+from tests.scenes import SOFT, block_on_plane, partitions, two_blocks
 
 TOLERANCE = 1e-10
 TENSION = 0.7

@@ -13,7 +13,7 @@ from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.results.deformed_state import AnyState
 from tests.equilibrium.checks import assert_solved, body_displacements
 from tests.equilibrium.conic_reference import ConicReference, ConicSolution
-from tests.equilibrium.gallery import block_on_plane, guided, partitions, pressed_block, two_blocks
+from tests.scenes import block_on_plane, guided, partitions, pressed_block, two_blocks
 
 TOLERANCE = 1e-9
 CELLS = ["hexahedron", "tetrahedron"]

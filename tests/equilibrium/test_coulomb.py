@@ -15,7 +15,7 @@ from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.results.deformed_state import AnyState
 from tests.equilibrium.checks import assert_solved, balance, body_displacements, friction_law
 from tests.equilibrium.conic_reference import ConicReference
-from tests.equilibrium.gallery import (
+from tests.scenes import (
     SOFT,
     block_on_plane,
     cornered_block,

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from fenics_contact import Body, ContactPair, Coulomb, Scene, Support, Surface, Tresca, solve_scene
 from fenics_contact.gallery import rectangle_lattice
 from fenics_contact.materials import PlaneStrain
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 
 def drawn(law: Coulomb | Tresca, kind: str) -> Scene:

@@ -35,10 +35,10 @@ from fenics_contact.study import Parameters
 from fenics_contact.study.scenes.cattaneo_mindlin import FRICTION, build, stick_half_width, theory, tractions
 from fenics_contact.study.study import Outcome
 from tests.equilibrium.checks import assert_solved
-from tests.equilibrium.gallery import partitions, two_blocks
 from tests.equilibrium.hertz import LENGTH, PLANE_STRAIN, Hertz, cylinder, edge, errors, pressed
 from tests.equilibrium.round_bodies import CELL
 from tests.equilibrium.round_bodies import pressed as pressed_bodies
+from tests.scenes import partitions, two_blocks
 
 
 def ball(radius: float) -> Hertz:

@@ -44,13 +44,13 @@ from tests.equilibrium.checks import assert_solved
 from tests.equilibrium.effect_cases import CASES, figures, solved
 from tests.equilibrium.effect_cases import collect as collect_effects
 from tests.equilibrium.fields_on_ranks import SCENES, cut
-from tests.equilibrium.gallery import SOFT
 from tests.equilibrium.given_fields import MESH, NODES, forces, rising, shifted
 from tests.equilibrium.own_forms import PRESSURE, integrals
 from tests.equilibrium.printed_on_ranks import main
 from tests.equilibrium.rank_cases import PARTITIONS, TENSION, collect
 from tests.readers.msh_files import name as name_of_group
 from tests.readers.msh_files import own_gmsh, within
+from tests.scenes import SOFT
 
 RANKS = [1, 2, 4]
 

@@ -42,10 +42,10 @@ from fenics_contact.results.deformed_state import AnyState
 from tests.conftest import run_on_ranks
 from tests.equilibrium.checks import assert_solved
 from tests.equilibrium.friction_steps import FRICTION, coulomb_reference, sheared_block
-from tests.equilibrium.gallery import block_on_plane, crowned, partitions, two_blocks
 from tests.equilibrium.step_cases import PATH as RESUMED_PATH
 from tests.equilibrium.step_cases import collect, sequence
 from tests.equilibrium.step_cases import shears as resumed_shears
+from tests.scenes import block_on_plane, crowned, partitions, two_blocks
 
 TOLERANCE = 1e-9
 #: Pressed, sheared until all slips, let go, sheared the other way, let go, sheared again.

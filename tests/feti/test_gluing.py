@@ -27,7 +27,7 @@ from fenics_contact.feti.decomposition import (
 from fenics_contact.gallery import block
 from fenics_contact.qp import DualProblem, FacePreconditioner
 from fenics_contact.qp.problem import RowsOfFace, Scaling
-from tests.equilibrium.corner_cases import corner
+from tests.feti.corner_cases import corner
 from tests.feti.scenes import CELLS, STEEL, Cut, lone_block, ragged_block, touching_blocks
 
 ROLLERS = (Support("block", "z0", (None, None, 0.1)), Support("block", "x0", (0.2, None, 0.1)))

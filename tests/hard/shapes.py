@@ -27,7 +27,7 @@ from fenics_contact.results import ContactResult
 from tests.design.blocks import PLASTIC, RUBBER, designs_of, side
 from tests.design.objectives import normal_forces
 from tests.design.pressed import DESIGN, SWITCHES
-from tests.equilibrium.gallery import FLOOR, crowned, partitions
+from tests.scenes import FLOOR, crowned, partitions
 
 Array = np.ndarray
 

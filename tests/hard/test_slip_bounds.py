@@ -9,8 +9,8 @@ from mpi4py import MPI
 from fenics_contact import FixedPoint, Tresca
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse, solve
-from tests.equilibrium.gallery import partitions, pressed_block
 from tests.hard.conftest import Record
+from tests.scenes import partitions, pressed_block
 from tools.hard_cases.trial import TOLERANCE, fallbacks
 
 SOLVERS: dict[str, DualSolver] = {

@@ -142,8 +142,8 @@ from fenics_contact.results import (
 )
 from fenics_contact.results.deformed_state import AnyState
 from tests.design.blocks import block_on_floor, designs_of
-from tests.equilibrium.gallery import partitions
 from tests.large_deformations.scenes import pressed, rounded
+from tests.scenes import partitions
 
 FACES = ("materials", "mesh", "results", "design")
 MOST_PRINTED = 25

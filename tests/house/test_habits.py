@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.house.floors import FLOORS
 from tests.house.source import ROOT, modules
 
 MOST_LINES = 700
@@ -80,6 +81,16 @@ def test_files_are_short() -> None:
     lengths = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in python_files()}
     assert len(lengths) > 10, "hardly any files were found: nothing was tested"
     assert {path: lines for path, lines in lengths.items() if lines > MOST_LINES} == {}
+
+
+#: Rooms of one module, and where their tests are.
+ELSEWHERE = {"_responses": "study", "__main__": "cli"}
+
+
+def test_every_room_has_a_folder_of_tests_of_its_name() -> None:
+    folders = {room: ELSEWHERE.get(room, room.removeprefix("_")) for floor in FLOORS for room in floor}
+    assert len(folders) > 20
+    assert [room for room, name in folders.items() if not [*(ROOT / "tests" / name).glob("test_*.py")]] == []
 
 
 def imported_tests(path: Path) -> list[str]:

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from fenics_contact import Coulomb, Scene, Status, solve_scene
 from fenics_contact.results.deformed_state import AnyState
-from tests.equilibrium.gallery import partitions, two_blocks
+from tests.scenes import partitions, two_blocks
 
 
 def blocks(cell: str = "hexahedron") -> Scene:

@@ -16,10 +16,10 @@ from fenics_contact._accuracy.discretisation import discretisation_error
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.output import write_xdmf
 from fenics_contact.output.paraview import checked_name, file_of_each
-from tests.equilibrium.gallery import partitions
-from tests.equilibrium.stress_cases import composite, solved
 from tests.output.states import touching_blocks
 from tests.pictures.plane_states import plane_block
+from tests.results.stress_cases import composite, solved
+from tests.scenes import partitions
 
 CELLS = ("hexahedron", "tetrahedron")
 VTK_CELLS = {"hexahedron": pv.CellType.HEXAHEDRON, "tetrahedron": pv.CellType.TETRA}
@@ -227,7 +227,7 @@ RANKS = """
     from fenics_contact import solve_scene
     from fenics_contact import write_vtu
     from fenics_contact.output import write_json, write_xdmf
-    from tests.equilibrium.gallery import partitions
+    from tests.scenes import partitions
     from tests.output.states import blocks
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])

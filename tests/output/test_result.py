@@ -50,7 +50,7 @@ from fenics_contact.output.result import described_scene, readable
 from fenics_contact.results import BalancedTolerance
 from tests.design.load_cases_on_ranks import cases_of
 from tests.design.resumed_cases import minimised, posed
-from tests.equilibrium.rigid_cases import POINT, SCENES, solved
+from tests.feti.rigid_cases import POINT, SCENES, solved
 from tests.output.states import touching_blocks
 
 
@@ -296,7 +296,7 @@ RANKS = """
     from fenics_contact.errors import InvalidInputError
     from fenics_contact import write_result
     from fenics_contact.output import read_result
-    from tests.equilibrium.gallery import partitions
+    from tests.scenes import partitions
     from tests.output.states import blocks
 
     comm, scene = MPI.COMM_WORLD, blocks()

@@ -264,7 +264,7 @@ RANKS = """
     import sys
     from mpi4py import MPI
     from fenics_contact.output import StepTable, write_contact_table
-    from tests.equilibrium.resultant_cases import SCENES, solved
+    from tests.results.resultant_cases import SCENES, solved
 
     comm, folder = MPI.COMM_WORLD, sys.argv[1]
     state = solved(SCENES["dragged"](), comm)

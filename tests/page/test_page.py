@@ -390,7 +390,7 @@ RANKS = """
     from fenics_contact import result_page
     from fenics_contact._page.page import Page
     from fenics_contact import Coulomb
-    from tests.equilibrium.gallery import partitions, two_blocks
+    from tests.scenes import partitions, two_blocks
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
     scene = two_blocks(Coulomb(0.4))

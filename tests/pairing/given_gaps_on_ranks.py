@@ -12,8 +12,8 @@ from mpi4py import MPI
 
 from fenics_contact import ContactProblem, Coulomb, Scene, solve_scene
 from fenics_contact.errors import FenicsContactError
-from tests.equilibrium.gallery import pressed_block, two_blocks
 from tests.equilibrium.press_fits import press_fit
+from tests.scenes import pressed_block, two_blocks
 
 
 def varying(points: np.ndarray) -> np.ndarray:

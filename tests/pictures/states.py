@@ -16,7 +16,7 @@ from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.pictures import Picture
 from fenics_contact.results.deformed_state import AnyState
-from tests.equilibrium.gallery import partitions, two_blocks
+from tests.scenes import partitions, two_blocks
 
 
 @lru_cache(maxsize=2)

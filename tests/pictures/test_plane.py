@@ -67,10 +67,10 @@ from fenics_contact.pictures.drawing import obstacle_layers, obstacles_of, outli
 from fenics_contact.pictures.section import refined, strongest_contact
 from fenics_contact.pictures.unrolled import contact_patches, label_axes
 from fenics_contact.shapes import Box, Cone, Plane, SignedDistance, Sphere, SurfaceShape, Torus, Triangulation
-from tests.equilibrium.gallery import partitions
 from tests.pictures.moving_states import block_among_movers, pressed_by_a_lid
 from tests.pictures.plane_states import caged_block, hung_block, pin_in_ring, plane_block
 from tests.pictures.states import contains, painted, pixels, pulled, touching_blocks
+from tests.scenes import partitions
 
 SMALL = 640
 

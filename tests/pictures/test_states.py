@@ -235,7 +235,7 @@ RANKS = """
     from fenics_contact import solve_scene
     from fenics_contact import Coulomb
     from fenics_contact.pictures import plot_contact_pressure, plot_decomposition, plot_stress
-    from tests.equilibrium.gallery import partitions, two_blocks
+    from tests.scenes import partitions, two_blocks
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
     scene = two_blocks(Coulomb(0.4))

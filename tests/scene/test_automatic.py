@@ -30,7 +30,7 @@ from fenics_contact.gallery import block, half_disc, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.mesh.near_surfaces import near_surfaces
-from tests.equilibrium.gallery import partitions
+from tests.scenes import partitions
 
 STEEL, RUBBER = IsotropicElasticity(2.1e5, 0.3), IsotropicElasticity(10.0, 0.3)
 LOW = block((0.0, 0.0, 0.0), (3.0, 3.0, 1.0), (3, 3, 1))

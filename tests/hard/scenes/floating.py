@@ -22,8 +22,8 @@ from fenics_contact import (
 )
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block
-from tests.equilibrium.gallery import block_on_plane, cornered_block, stack, two_blocks
 from tests.hard.scenes.parts import SOFT, STIFF, clamped, cubes, force
+from tests.scenes import block_on_plane, cornered_block, stack, two_blocks
 from tools.hard_cases.trial import Trial, cut_trial, trial
 
 GROUP = "floating"

@@ -11,7 +11,7 @@ from fenics_contact import Body, BodyMesh, Coulomb, Scene
 from fenics_contact.gallery import block
 from fenics_contact.mesh import scaled_jacobian
 from fenics_contact.mesh.quality import jacobians
-from tests.equilibrium.gallery import SOFT, block_on_plane, crowned, two_blocks
+from tests.scenes import SOFT, block_on_plane, crowned, two_blocks
 from tools.hard_cases.transform import renumbered_mesh, turned
 from tools.hard_cases.trial import Answer, Trial, bisected, cut_trial, trial
 

@@ -23,7 +23,7 @@ from fenics_contact import (
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.mesh.partition import merge_pieces
-from tests.equilibrium.gallery import (
+from tests.scenes import (
     FLOOR,
     SOFT,
     STIFF,

@@ -27,9 +27,9 @@ from fenics_contact.gallery import block, box_lattice, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStress
 from fenics_contact.mesh import quadratic
 from tests.equilibrium.contrast import FRICTION, Blocks, Regions
-from tests.equilibrium.gallery import crowned
 from tests.equilibrium.hertz import Hertz, errors
 from tests.hard.scenes.parts import FLOOR
+from tests.scenes import crowned
 from tools.hard_cases.trial import Trial, bisected, boxes, cut_trial, failing_trial, ragged, trial
 
 GROUP = "stiffness"

@@ -24,8 +24,8 @@ from fenics_contact import (
 )
 from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
-from tests.equilibrium.gallery import SOFT, block_on_plane, pressed_block
 from tests.hard.scenes.parts import FLOOR, UP
+from tests.scenes import SOFT, block_on_plane, pressed_block
 from tools.hard_cases.trial import Trial, bisected, cut_trial, failing_trial, ragged, trial
 
 GROUP = "touching"

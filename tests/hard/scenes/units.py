@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from fenics_contact import Coulomb
-from tests.equilibrium.gallery import two_blocks
+from tests.scenes import two_blocks
 from tools.hard_cases.transform import in_units
 from tools.hard_cases.trial import Answer, Trial, cut_trial, trial
 

@@ -39,7 +39,7 @@ from fenics_contact.qp import FaceNewton
 from fenics_contact.results.deformed_state import AnyState, DeformedState
 from tests.conftest import run_on_ranks
 from tests.equilibrium.friction_steps import FLOOR, FRICTION, coulomb_reference, sheared_block
-from tests.equilibrium.released_cases import HARDENING, LENGTH, LOAD, PULL, YIELD, YOUNG, both
+from tests.scene.released_cases import HARDENING, LENGTH, LOAD, PULL, YIELD, YOUNG, both
 
 #: A block on a floor with friction: pressed and pushed, let go along x, pushed back, let go along x and y.
 TOP = ((0.0, 0.0, -0.01), (0.012, 0.0, -0.01), (None, 0.0, -0.01), (-0.004, 0.0, -0.01), (None, None, -0.01))

@@ -51,7 +51,10 @@ from fenics_contact.results.forces import nodal_forces
 from fenics_contact.results.state import pairs_in_words
 from fenics_contact.theory import hertz_line, hertz_point
 from tests.equilibrium.checks import assert_solved
-from tests.equilibrium.gallery import (
+from tests.equilibrium.rank_cases import TENSION, uniaxial
+from tests.pictures.plane_states import plane_block
+from tests.pictures.states import pulled, touching_blocks
+from tests.scenes import (
     SOFT,
     STIFF,
     block_on_plane,
@@ -60,9 +63,6 @@ from tests.equilibrium.gallery import (
     pressed_block,
     two_blocks,
 )
-from tests.equilibrium.rank_cases import TENSION, uniaxial
-from tests.pictures.plane_states import plane_block
-from tests.pictures.states import pulled, touching_blocks
 
 TOLERANCE = 1e-9
 
@@ -299,7 +299,7 @@ PYVISTA_RANKS = """
     from mpi4py import MPI
     from fenics_contact import solve_scene
     from fenics_contact import Coulomb
-    from tests.equilibrium.gallery import partitions, two_blocks
+    from tests.scenes import partitions, two_blocks
 
     scene = two_blocks(Coulomb(0.4))
     state = solve_scene(scene, MPI.COMM_WORLD, partitions=partitions(scene), tolerance=1e-6)

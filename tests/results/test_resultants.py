@@ -34,7 +34,7 @@ from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke, Pl
 from fenics_contact.mesh import quadratic
 from tests.conftest import run_on_ranks
 from tests.equilibrium.bedded import FORCE, Bedded, pushed
-from tests.equilibrium.resultant_cases import BESIDE, GIVEN, MOMENT, SCENES, numbers, solved
+from tests.results.resultant_cases import BESIDE, GIVEN, MOMENT, SCENES, numbers, solved
 from tools.hard_cases.invariants import Whole
 
 SCRIPT = Path(__file__).with_name("resultant_cases.py")

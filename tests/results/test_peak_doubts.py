@@ -25,8 +25,8 @@ from fenics_contact.materials import PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.resolution import CALL, CoarsePeak, UnmatchedNodes, in_words
-from tests.equilibrium.between_nodes import pressed_on_disc
 from tests.equilibrium.round_bodies import CELL, pressed
+from tests.pairing.between_nodes import pressed_on_disc
 
 PLACE = "upper y0 on lower y1"
 

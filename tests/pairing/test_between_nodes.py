@@ -18,7 +18,7 @@ from fenics_contact._pairing.sliding.contact import SlidingContact
 from fenics_contact.materials import J2Plasticity, PlaneStrain
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.resolution import CALL, BetweenNodes
-from tests.equilibrium.between_nodes import (
+from tests.pairing.between_nodes import (
     DEPTH,
     RADIUS,
     ball_of_triangles,
@@ -199,7 +199,7 @@ def test_next_load_steps_find_their_own_points() -> None:
 ON_RANKS = """
 from mpi4py import MPI
 from fenics_contact import solve_scene
-from tests.equilibrium.between_nodes import pressed_on_disc
+from tests.pairing.between_nodes import pressed_on_disc
 state = solve_scene(pressed_on_disc(0.42), MPI.COMM_WORLD, tolerance=1e-9)
 if MPI.COMM_WORLD.rank == 0:
     print(repr(float(state.contact.force[:, 1].sum())), len(state.torn.points.are_inside))

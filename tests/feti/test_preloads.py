@@ -38,7 +38,7 @@ from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke
 from fenics_contact.mesh.faces import vector_areas
 from fenics_contact.output import read_result
-from tests.equilibrium.bolts import (
+from tests.feti.bolts import (
     BOLT,
     LENGTH,
     LOADS,
@@ -322,7 +322,7 @@ RANKS = """
     from mpi4py import MPI
     from fenics_contact import ContactProblem, LoadStep, solve_steps
     from fenics_contact import Preload
-    from tests.equilibrium.bolts import MIDDLE, joint, pulled
+    from tests.feti.bolts import MIDDLE, joint, pulled
 
     comm = MPI.COMM_WORLD
     scene = joint(Preload("bolt", MIDDLE, force=50.0))

@@ -29,9 +29,9 @@ from fenics_contact.mesh import quadratic
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import is_triangle
 from fenics_contact.results.fields import contact_fields
-from tests.equilibrium.mixed_surfaces import LOWER, UPPER, displacement_on, pressed, raised, wavy
 from tests.fem.mixed_cells import ORDERS, mixed_bar
 from tests.fem.several_ranks import displacement_of
+from tests.pairing.mixed_surfaces import LOWER, UPPER, displacement_on, pressed, raised, wavy
 
 #: Whether the meshes match, and bodies deform much.
 CASES = [
@@ -89,7 +89,7 @@ def test_tied_surfaces_are_stretched_evenly(order: str) -> None:
 def test_every_number_of_ranks_has_the_same_answer(mpirun) -> None:  # type: ignore[no-untyped-def]
     alone = np.array(displacement_on(MPI.COMM_SELF))
     for ranks in (2, 4):
-        answer = displacement_of("tests.equilibrium.mixed_surfaces", ranks, mpirun)
+        answer = displacement_of("tests.pairing.mixed_surfaces", ranks, mpirun)
         np.testing.assert_allclose(answer, alone, atol=1e-8 * np.abs(alone).max())
 
 

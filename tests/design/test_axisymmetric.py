@@ -35,7 +35,7 @@ from tests.design.deformed_blocks import design_problem, pressed
 from tests.design.objectives import objectives
 from tests.design.plane_blocks import line_of
 from tests.design.quotients import Line, check_adjoint
-from tests.equilibrium.gallery import crowned
+from tests.scenes import crowned
 
 RUBBER, PLASTIC = IsotropicElasticity(100.0, 0.3, 1e-3), IsotropicElasticity(300.0, 0.2, 1e-3)
 OBJECTIVES = {**objectives("block"), **aims("block", "y0", 2)}

@@ -45,7 +45,7 @@ from fenics_contact.qp import SlidingError
 from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.results.deformed_state import AnyState
 from tests.equilibrium.press_fits import BORE, NU, RIM, ring
-from tests.equilibrium.sector_cases import (
+from tests.feti.sector_cases import (
     SCENES,
     SECTORS,
     SOFT,

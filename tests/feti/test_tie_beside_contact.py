@@ -27,7 +27,7 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import NeoHooke
 from fenics_contact.qp import FaceNewton, face_newton
-from tests.equilibrium.half_tied import MATERIAL, half_tied, solved
+from tests.feti.half_tied import MATERIAL, half_tied, solved
 
 
 @pytest.mark.parametrize(

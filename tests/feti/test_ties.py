@@ -40,9 +40,9 @@ from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicE
 from fenics_contact.qp import FaceNewton, Smalse
 from fenics_contact.study import Parameters
 from fenics_contact.study.scenes import hertz
-from tests.equilibrium.corner_cases import corner, planes
-from tests.equilibrium.corner_cases import solved as solved_corner
-from tests.equilibrium.half_tied import FREE, MATERIAL, TIED, TOP, half_tied, solved
+from tests.feti.corner_cases import corner, planes
+from tests.feti.corner_cases import solved as solved_corner
+from tests.feti.half_tied import FREE, MATERIAL, TIED, TOP, half_tied, solved
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 FACES = Surface("upper", "z0"), Surface("lower", "z1")

@@ -33,7 +33,7 @@ from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.qp import FaceNewton
-from tests.equilibrium.gallery import (
+from tests.scenes import (
     FLOOR,
     SOFT,
     block_on_plane,

@@ -39,7 +39,7 @@ from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.qp import FaceNewton
 from tests.design.blocks import side
 from tests.equilibrium.press_fits import BORE, NU, RIM, YOUNG, ring
-from tests.equilibrium.roller_cases import SCENES, SOFT, TURN, fit, found, solved, stack, turned, wedge
+from tests.scene.roller_cases import SCENES, SOFT, TURN, fit, found, solved, stack, turned, wedge
 
 SCRIPT = Path(__file__).with_name("roller_cases.py")
 IN_PLANE = PlaneStrain(1000.0, 0.3)

@@ -35,7 +35,10 @@ from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain, PlaneStress
 from fenics_contact.results.deformed_state import AnyState
-from tests.equilibrium.gallery import (
+from tests.results.stress_cases import PEAK, composite, cylinder, lame, line_contact, punched
+from tests.results.stress_cases import SCENES as STRESSED
+from tests.results.stress_cases import solved as solved_stress
+from tests.scenes import (
     SOFT,
     STIFF,
     block_on_plane,
@@ -45,9 +48,6 @@ from tests.equilibrium.gallery import (
     stack,
     two_blocks,
 )
-from tests.equilibrium.stress_cases import PEAK, composite, cylinder, lame, line_contact, punched
-from tests.equilibrium.stress_cases import SCENES as STRESSED
-from tests.equilibrium.stress_cases import solved as solved_stress
 from tools.hard_cases.transform import in_units, turned
 
 #: Units of length and force in which stiffness and moduli become as small and as large as can be.

@@ -39,7 +39,7 @@ from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.results import RigidMotion
 from fenics_contact.results.deformed_state import AnyState
-from tests.equilibrium.rigid_cases import FORCE, MOMENT, POINT, SCENES, SOFT, bar, numbers, shaft, solved
+from tests.feti.rigid_cases import FORCE, MOMENT, POINT, SCENES, SOFT, bar, numbers, shaft, solved
 from tools.hard_cases.invariants import Whole
 
 SCRIPT = Path(__file__).with_name("rigid_cases.py")

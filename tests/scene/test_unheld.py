@@ -42,9 +42,9 @@ from fenics_contact.materials import IsotropicElasticity, J2Plasticity, Material
 from fenics_contact.mesh import refined
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp import FaceNewton, Smalse
-from tests.equilibrium.gallery import block_on_plane, two_blocks
 from tests.equilibrium.press_fits import Disc, press_fit
 from tests.equilibrium.stacks import RUBBER, TURN, cut, turned_stack
+from tests.scenes import block_on_plane, two_blocks
 
 
 def cube_on_floor(n: int) -> Scene:
