@@ -12,6 +12,7 @@ STUDIES ?= hertz cattaneo_mindlin chain_links
 PYTHON ?=
 WHEEL ?=
 JOBS ?= 2
+ROOM ?=
 COUNT ?= 1000
 KIND ?= linear
 export WHEEL
@@ -43,6 +44,7 @@ help: ## Show this list
 	@echo "  STUDIES=hertz        which studies (all three); NP ranks each"
 	@echo "  BENCH=quick|full     small cases once, or all of them (full)"
 	@echo "  JOBS=4               tests at a time (2)"
+	@echo "  ROOM=\"decks scene\"   rooms whose tests alone \`make test\` runs, by their folders in tests/ (all)"
 	@echo "  COUNT=200            how many random scenes or spoilt files (1000)"
 	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"
 	@echo "  WHEEL=1              set up FEniCSx without root, by a third party's wheel, which is alpha (0: by packages)"
@@ -58,9 +60,23 @@ notebooks: $(prepare) ## Run the notebooks and store what they show, or NOTEBOOK
 
 quick = $(launch) 1 $(python) -m pytest -n $(JOBS) --dist loadfile -m "not slow and not hard and not claim"
 
-test: lint ## Check style and types, run the quick tests and the quick benchmark, of which counts are judged
+# What ROOM="decks scene" looks at: the rooms, their tests, and the rules of the house that every room keeps.
+tested := $(ROOM:%=tests/%)
+parts := $(wildcard $(tested) $(foreach room,$(ROOM),fenics_contact/$(room) fenics_contact/_$(room) fenics_contact/$(room).py \
+  tools/$(room) $(filter $(room),benchmarks demos notebooks)))
+rules := $(addprefix tests/house/test_, habits.py imports.py public_names.py ratchet.py words.py)
+missing := $(filter-out $(wildcard $(tested)),$(tested))
+
+test: $(if $(strip $(ROOM)),$(prepare),lint) ## Check style and types, run the quick tests and the quick benchmark; or of ROOM=decks alone
+ifeq ($(strip $(ROOM)),)
 	$(quick)
 	$(python) -m benchmarks --quick
+else
+	@$(if $(missing),echo "$(missing): no such folder; rooms are" $(notdir $(patsubst %/,%,$(wildcard tests/*/))) >&2; exit 2)
+	$(python) -m ruff check $(parts)
+	$(python) -m mypy $(parts)
+	$(quick) $(tested) $(rules)
+endif
 
 core := tests/dolfinx $(addprefix tests/pairing/test_, patch.py quadratic_cells.py) \
   $(addprefix tests/equilibrium/test_, coulomb.py hertz.py ranks.py) \
