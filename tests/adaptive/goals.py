@@ -13,6 +13,7 @@ from fenics_contact import (
     BodyForce,
     BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
     DistanceObstacle,
     LinearState,
@@ -22,10 +23,9 @@ from fenics_contact import (
     Support,
     Surface,
     Traction,
+    goal_error,
     solve_scene,
 )
-from fenics_contact._adaptive.goal_errors import goal_error
-from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.loads import Load
 from fenics_contact.design import ContactForces, LargestPressure, StrainEnergy
 from fenics_contact.gallery import block, box_lattice, half_disc, rectangle, rectangle_lattice

@@ -19,10 +19,10 @@ from fenics_contact import (
     Surface,
     Tie,
     Traction,
+    goal_error,
 )
 from fenics_contact._adaptive import boundary_errors, goal_errors
 from fenics_contact._adaptive.contact_residuals import between_nodes
-from fenics_contact._adaptive.goal_errors import goal_error
 from fenics_contact._adaptive.resultants import SupportForce, _of_joints
 from fenics_contact._surfaces.facets import faceted_surface
 from fenics_contact._surfaces.true_surface import by_shape

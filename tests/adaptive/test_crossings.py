@@ -11,6 +11,7 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     BodyMesh,
+    Limits,
     RigidSurface,
     Roller,
     Scene,
@@ -25,7 +26,6 @@ from fenics_contact._adaptive.crossings import (
     left_at_crossings,
     refined_at_crossings,
 )
-from fenics_contact._adaptive.levels import Limits
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import block, rectangle, rectangle_lattice

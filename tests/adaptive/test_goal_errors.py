@@ -14,7 +14,9 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
+    GoalError,
     LinearState,
     Pressure,
     RigidPlane,
@@ -24,14 +26,13 @@ from fenics_contact import (
     Support,
     Surface,
     Traction,
+    goal_error,
     solve_scene,
 )
 from fenics_contact._adaptive import goal_errors
-from fenics_contact._adaptive.goal_errors import GoalError, goal_error
 from fenics_contact._adaptive.marking import bulk
 from fenics_contact._adaptive.refined_scene import refine_scene
 from fenics_contact._adaptive.resultants import PairForce, SupportForce
-from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact.design import (
     ContactArea,
     LargestPressure,

@@ -12,9 +12,12 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import (
+    AccurateResult,
     Body,
     ContactPair,
     Coulomb,
+    Level,
+    Limits,
     RigidPlane,
     RigidSphere,
     Scene,
@@ -24,11 +27,13 @@ from fenics_contact import (
     TotalForce,
     Traction,
     gallery,
+    goal_error,
     quantity,
+    solve_to,
     theory,
 )
-from fenics_contact._adaptive.goal_errors import goal_error, value_of
-from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, Way, solve_to
+from fenics_contact._adaptive.goal_errors import value_of
+from fenics_contact._adaptive.levels import Way
 from fenics_contact._adaptive.resultants import StickArea
 from fenics_contact._base.memory import available_memory
 from fenics_contact._base.progress import Kind

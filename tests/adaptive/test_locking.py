@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, Scene, Support, Traction, solve_to
-from fenics_contact._adaptive.levels import AccurateResult, Limits
+from fenics_contact import AccurateResult, Body, Limits, Scene, Support, Traction, solve_to
 from fenics_contact._adaptive.locking import locking_in_words, locks
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import NeoHooke, PlaneStrain, PlaneStress

@@ -21,9 +21,10 @@ from fenics_contact import (
     Tie,
     Traction,
     contact_area,
+    goal_error,
+    quantity,
 )
-from fenics_contact._adaptive.goal_errors import goal_error
-from fenics_contact._adaptive.quantities import QUANTITIES, quantity
+from fenics_contact._adaptive.quantities import QUANTITIES
 from fenics_contact._adaptive.resultants import PairForce, StickArea, SupportForce, TouchingArea
 from fenics_contact.design import (
     ContactArea,

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     ContactPair,
+    Limits,
     RigidPlane,
     RigidSphere,
     Scene,
@@ -22,7 +23,6 @@ from fenics_contact import (
     theory,
 )
 from fenics_contact._adaptive import levels
-from fenics_contact._adaptive.levels import Limits
 from fenics_contact._adaptive.small_spots import doubted_pairs, refined_at_spots
 from fenics_contact.design import PeakPressure
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain

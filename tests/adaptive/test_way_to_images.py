@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, BodyMesh, ContactProblem, LinearState, Scene, Support, TotalForce
-from fenics_contact._adaptive.goal_errors import goal_error
+from fenics_contact import Body, BodyMesh, ContactProblem, LinearState, Scene, Support, TotalForce, goal_error
 from fenics_contact._adaptive.way_to_images import way_to_images
 from fenics_contact.design import Movement, Objective, TotalPotential
 from fenics_contact.gallery import LinkShape, block, chain_link, rectangle

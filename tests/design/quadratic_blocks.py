@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 
 from fenics_contact import Body, BodyForce, ContactPair, Coulomb, Scene, Support, Surface, Traction, Tresca
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block
 from fenics_contact.mesh import quadratic
 from tests.design.blocks import PLASTIC, RUBBER
@@ -29,7 +28,7 @@ def on_floor(friction: Friction, cell: str) -> Scene:
     )
 
 
-def on_one_another(friction: Friction, cell: str, discretisation: Discretisation = "node") -> Scene:
+def on_one_another(friction: Friction, cell: str, discretisation: str = "node") -> Scene:
     """A crowned block that only the rounded one under it holds; no node lies over an edge of a facet."""
     lower = quadratic(block((0.0, 0.0, -1.0), (2.0, 1.2, 0.0), (3, 2, 1), cell))
     x, y, z = lower.points.T

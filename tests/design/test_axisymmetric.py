@@ -24,7 +24,6 @@ from fenics_contact import (
     Traction,
     Tresca,
 )
-from fenics_contact._scene.pairs import Discretisation, Friction
 from fenics_contact._scene.parts import surface_of
 from fenics_contact.design import ContactArea, Movement, PressureNorm
 from fenics_contact.gallery import rectangle
@@ -35,13 +34,13 @@ from tests.design.deformed_blocks import design_problem, pressed
 from tests.design.objectives import objectives
 from tests.design.plane_blocks import line_of
 from tests.design.quotients import Line, check_adjoint
-from tests.scenes import crowned
+from tests.scenes import Friction, crowned
 
 RUBBER, PLASTIC = IsotropicElasticity(100.0, 0.3, 1e-3), IsotropicElasticity(300.0, 0.2, 1e-3)
 OBJECTIVES = {**objectives("block"), **aims("block", "y0", 2)}
 
 
-def on_block(friction: Friction, by: Discretisation, *, order: int = 1, heat: float = 0.0) -> Scene:
+def on_block(friction: Friction, by: str, *, order: int = 1, heat: float = 0.0) -> Scene:
     """A heavy crowned ring on a rounded one, pressed and pushed outwards."""
     inner, warmed = 0.5, [ThermalStrain("block", heat)] if heat else []
     lower = rectangle((inner, -1.0), (inner + 2.0, 0.0), (7, 3))

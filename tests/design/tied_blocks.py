@@ -19,7 +19,6 @@ from fenics_contact import (
     Tie,
     Traction,
 )
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
@@ -40,7 +39,7 @@ def _boxes(cell: str) -> tuple[BodyMesh, BodyMesh]:
 
 
 def capped(
-    cell: str, *, sliding: bool = False, order: int = 1, discretisation: Discretisation = "node"
+    cell: str, *, sliding: bool = False, order: int = 1, discretisation: str = "node"
 ) -> Scene:
     """A crowned block that a floor holds, and a cap on its rounded top that is pressed."""
     below, above = (quadratic(mesh) if order == 2 else mesh for mesh in _boxes(cell))

@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 
 from fenics_contact import Body, BodyMesh, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, Traction
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from tests.scenes import crowned
@@ -46,7 +45,7 @@ class Blocks:
     soft: str
     slave: str
     friction: Coulomb | None
-    discretisation: Discretisation = "node"
+    discretisation: str = "node"
 
     def scene(self, contrast: float) -> Scene:
         law = {name: elastic(1.0 if name == self.soft else contrast) for name in ("lower", "upper")}

@@ -18,9 +18,9 @@ from fenics_contact import (
     Surface,
     solve_scene,
 )
-from fenics_contact._scene.pairs import Friction
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
+from tests.scenes import Friction
 
 MESH = block((0, 0, 0), (4, 1, 1), (8, 2, 2))
 FLOOR = RigidPlane((0, 0, 0), (0, 0, 1))

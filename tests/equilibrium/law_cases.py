@@ -27,7 +27,6 @@ from fenics_contact import (
     box_partition,
     solve_scene,
 )
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, Material
 
@@ -109,7 +108,7 @@ def tilted_block(closure: ClosureLaw | None, friction: Coulomb | None) -> Scene:
 
 
 def pressed_and_sheared(
-    material: Material, discretisation: Discretisation, size: float, cells: int = 2
+    material: Material, discretisation: str, size: float, cells: int = 2
 ) -> Scene:
     """A block on a wider one, its top moved down and aside; nothing slips."""
     bodies = {

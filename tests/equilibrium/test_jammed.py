@@ -32,7 +32,6 @@ from fenics_contact import (
 )
 from fenics_contact._equilibrium import followed_loads
 from fenics_contact._scene.pair_geometry import outline_of, unpaired
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.gallery import block, disc, rectangle, rectangle_lattice
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
@@ -446,7 +445,7 @@ def about_open_means(caplog: pytest.LogCaptureFixture, scene: Scene) -> tuple[St
 
 @pytest.mark.parametrize(("push", "discretisation"), [(-0.01, "mortar"), (0.01, "mortar"), (-0.01, "node")])
 def test_round_bodies_on_facets_that_are_too_large_are_reported(
-    push: float, discretisation: Discretisation, caplog: pytest.LogCaptureFixture
+    push: float, discretisation: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     material = PlaneStrain(1000.0, 0.3)
     bodies = {

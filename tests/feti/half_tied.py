@@ -19,7 +19,6 @@ from fenics_contact import (
     Tie,
     solve_scene,
 )
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain
 
@@ -27,7 +26,7 @@ MATERIAL = PlaneStrain(1.0, 0.3)
 TOP, TIED, FREE = Surface("up", "y0"), Surface("low", "tied"), Surface("low", "free")
 
 
-def half_tied(columns: int, discretisation: Discretisation, sliding: bool) -> Scene:
+def half_tied(columns: int, discretisation: str, sliding: bool) -> Scene:
     """A block on a strip, tied on its left half and in contact with friction on its right one."""
     low, up = rectangle((0, 0), (2, 0.4), (6, 2)), rectangle((0, 0.4), (2, 1.2), (columns, 3))
     facets = low.surfaces["y1"]

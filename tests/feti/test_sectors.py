@@ -34,7 +34,6 @@ from fenics_contact import (
     contact_area,
     solve_scene,
 )
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.design import TotalPotential
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
@@ -104,7 +103,7 @@ def test_nodes_on_the_axis_belong_to_both_sides() -> None:
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
-def test_pressure_reaches_the_side_whose_points_are_on_the_other(discretisation: Discretisation) -> None:
+def test_pressure_reaches_the_side_whose_points_are_on_the_other(discretisation: str) -> None:
     """Areas, fields and pictures, also where there is another pair, which stays open."""
     lid, shown = RigidPlane((0.0, 0.0, 0.6), (0.0, 0.0, -1.0)), []
     for whole in (False, True):
@@ -137,7 +136,7 @@ def test_sides_may_belong_to_two_bodies() -> None:
 
 
 @pytest.mark.parametrize(("discretisation", "order"), [("node", 1), ("mortar", 1), ("mortar", 2)])
-def test_sides_whose_meshes_differ_pass_the_patch_test(discretisation: Discretisation, order: int) -> None:
+def test_sides_whose_meshes_differ_pass_the_patch_test(discretisation: str, order: int) -> None:
     scene = rotor(skew=0.3)
     assert all(tie.reason == "mortar, as the meshes do not match" for tie in scene.ties)
     hub = {"hub": scene.bodies["hub"]}

@@ -29,7 +29,6 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact._equilibrium.steps import stored_state
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke
@@ -118,7 +117,7 @@ def test_a_block_that_moves_far_follows_the_same_loop(law: Coulomb | Tresca) -> 
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
-def test_under_small_loads_large_deformations_are_the_linear_ones(discretisation: Discretisation) -> None:
+def test_under_small_loads_large_deformations_are_the_linear_ones(discretisation: str) -> None:
     size = 1e-4
     plain, far = (
         solve_scene(pressed_and_sheared(material, discretisation, size, cells=1), MPI.COMM_SELF).contact
@@ -130,7 +129,7 @@ def test_under_small_loads_large_deformations_are_the_linear_ones(discretisation
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
-def test_springs_turn_with_the_bodies(discretisation: Discretisation) -> None:
+def test_springs_turn_with_the_bodies(discretisation: str) -> None:
     scene, states = pressed_and_sheared(NeoHooke(100.0, 0.3), discretisation, 0.05), []
     held = {"low": ("z0", (0.0, 0.0, 0.0)), "high": ("z1", (0.02, 0.0, -0.05))}
     axis = (0.0, 0.0, 1.0)

@@ -22,7 +22,6 @@ from fenics_contact import (
     Traction,
     solve_scene,
 )
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import NeoHooke
@@ -35,7 +34,7 @@ from tests.feti.half_tied import MATERIAL, half_tied, solved
     [(5, "node", True), (5, "node", False), (6, "mortar", True), (5, "mortar", True)],
 )
 def test_an_edge_between_tie_and_contact_has_one_answer_for_every_partition(
-    columns: int, discretisation: Discretisation, sliding: bool
+    columns: int, discretisation: str, sliding: bool
 ) -> None:
     scene = half_tied(columns, discretisation, sliding)
     first, *others = (solved(scene, parts) for parts in ((1, 1), (2, 3), (4, 4), (6, 5), (3, 7)))
@@ -87,7 +86,7 @@ def test_tied_nodes_of_a_contact_are_counted(caplog: pytest.LogCaptureFixture) -
 @pytest.mark.parametrize("gap", [None, 0.001])
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
 def test_a_tied_node_is_no_contact_point_where_bodies_deform_much(
-    discretisation: Discretisation, gap: float | None
+    discretisation: str, gap: float | None
 ) -> None:
     scene = half_tied(6, discretisation, sliding=False)
     rubber = {name: replace(body, material=NeoHooke(1.0, 0.3)) for name, body in scene.bodies.items()}

@@ -33,7 +33,6 @@ from fenics_contact._equilibrium.warnings import _Gradients, rotation_of
 from fenics_contact._pairing.advice import ADVICE
 from fenics_contact._pairing.search import find_tied_points
 from fenics_contact._scene.pair_geometry import master_share
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicElasticity
@@ -65,7 +64,7 @@ def cuts(scene: Scene) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
-def test_tied_matching_meshes_are_one_mesh(discretisation: Discretisation) -> None:
+def test_tied_matching_meshes_are_one_mesh(discretisation: str) -> None:
     scene = tower(ties=[Tie(*FACES, discretisation=discretisation)])
     tied = solve_scene(scene, MPI.COMM_SELF, partitions=cuts(scene), tolerance=1e-10)
     whole = block((0, 0, 0), (2, 1, 2), (4, 3, 4))
@@ -111,7 +110,7 @@ def test_a_sliding_tie_holds_the_normal_direction_alone() -> None:
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
 @pytest.mark.parametrize("sliding", [True, False])
 def test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to(
-    sliding: bool, discretisation: Discretisation
+    sliding: bool, discretisation: str
 ) -> None:
     """The upper block is moved along x as a whole; what it does to the lower one is all that deforms."""
     moved = [Support("lower", "z0"), Support("upper", "z1", (0.1, 0.0, 0.0))]
@@ -239,7 +238,7 @@ def test_the_share_is_that_of_the_compliance() -> None:
 PARTS = ((1, 1), (2, 3), (6, 5))
 
 
-def two_pairs(discretisation: Discretisation = "node", first: float = 0.4, columns: int = 5) -> Scene:
+def two_pairs(discretisation: str = "node", first: float = 0.4, columns: int = 5) -> Scene:
     """A block that is pressed on a strip, dragged, and rubs otherwise on its left half."""
     scene = half_tied(columns, discretisation, sliding=False)
     drag = RigidSurface("up", "y1", (0.7, 1.5), force=(2.1e-3, -1e-2), moment=-4e-4)
@@ -250,7 +249,7 @@ def two_pairs(discretisation: Discretisation = "node", first: float = 0.4, colum
     return replace(scene, ties=[], contacts=pairs, supports=[scene.supports[0], drag])
 
 
-def of_rubber(discretisation: Discretisation = "node") -> Scene:
+def of_rubber(discretisation: str = "node") -> Scene:
     scene = two_pairs(discretisation)
     bodies = {name: replace(body, material=NeoHooke(1.0, 0.3)) for name, body in scene.bodies.items()}
     held = [Support("low", "y0"), Support("up", "y1", (0.02, -0.02))]

@@ -17,10 +17,13 @@ from mpi4py import MPI
 
 import fenics_contact
 from fenics_contact import (
+    AccurateDesign,
+    AccurateResult,
     AutomaticContact,
     AutomaticSteps,
     BodyForce,
     BodyMesh,
+    CarriedState,
     Checkpoint,
     ClosureTable,
     ConstraintTerm,
@@ -36,6 +39,8 @@ from fenics_contact import (
     FrictionTable,
     InitialStress,
     Kept,
+    Level,
+    Limits,
     LinearClosure,
     LinearConstraint,
     LoadSequence,
@@ -74,10 +79,7 @@ from fenics_contact import (
 from fenics_contact._accuracy.certificate import certify
 from fenics_contact._accuracy.recovery import find_sites
 from fenics_contact._accuracy.state_errors import solver_errors
-from fenics_contact._adaptive.levels import AccurateResult, Level, Limits
-from fenics_contact._adaptive.minimised import AccurateDesign
 from fenics_contact._base.display import COLUMNS, LINES, Table, displayed, in_lines, tabled
-from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._optimize.problem import pose
 from fenics_contact.design import (
     AdaptiveTolerance,

@@ -11,7 +11,8 @@ from types import ModuleType
 
 import pytest
 
-from fenics_contact._base.launching import clean_environment, finished
+from fenics_contact import clean_environment
+from fenics_contact._base.launching import finished
 from tests.conftest import ROOT
 
 #: Status, name, what it depends on, what it provides; and the entries of the folder of modules.

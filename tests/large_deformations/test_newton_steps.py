@@ -53,7 +53,6 @@ from fenics_contact._large_deformations.tangent import (
 )
 from fenics_contact._large_deformations.tangent_step import tangent_step
 from fenics_contact._scene.obstacles import RigidObstacle
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -542,7 +541,7 @@ def test_a_body_that_may_slide_freely_is_told_to_be_held(friction: Coulomb | Non
     ],
 )
 def test_a_path_by_nodes_of_bodies_that_slide_is_told_of_mortar(
-    material: Material, way: Discretisation, told: bool
+    material: Material, way: str, told: bool
 ) -> None:
     bodies = {"low": Body(rectangle((0, 0), (1, 1), (3, 3)), material)}
     bodies["high"] = Body(rectangle((0, 1), (1, 2), (4, 4)), material)

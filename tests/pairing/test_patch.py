@@ -22,10 +22,10 @@ from fenics_contact import (
     Traction,
     solve_scene,
 )
-from fenics_contact._scene.pairs import Discretisation, Friction
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain, PlaneStress
 from fenics_contact.qp import FaceNewton, ProjectedCG
+from tests.scenes import Friction
 
 PRESSURE = 10.0
 SOFT, STIFF = IsotropicElasticity(1000.0, 0.3), IsotropicElasticity(3000.0, 0.2)
@@ -53,7 +53,7 @@ def bodies(slave: str, master: str) -> dict[str, Body]:
 
 
 def pressed(
-    parts: dict[str, Body], discretisation: Discretisation, *, tied: bool = False, friction: Friction = None
+    parts: dict[str, Body], discretisation: str, *, tied: bool = False, friction: Friction = None
 ) -> Scene:
     """Press on top; rollers on three sides let the bodies widen freely."""
     dim = parts["lower"].mesh.dim

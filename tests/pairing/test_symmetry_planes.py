@@ -24,7 +24,6 @@ from fenics_contact import (
     solve_scene,
     solve_steps,
 )
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact._scene.parts import surface_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
@@ -38,7 +37,7 @@ TOLERANCE = 1e-9
 FACES = Surface("upper", "z0"), Surface("lower", "z1")
 
 
-def stack(width: float, cells: int, discretisation: Discretisation = "node") -> Scene:
+def stack(width: float, cells: int, discretisation: str = "node") -> Scene:
     """A narrow block pushed along a wide one; of a half model the plane y = 0 is one of symmetry."""
     low = -width if cells > 4 else 0.0
     lower = block((0, low, 0), (2, width, 1), (5, cells, 2))
@@ -60,7 +59,7 @@ def solved(scene: Scene) -> AnyState:
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
-def test_half_a_model_gives_half_the_answer(discretisation: Discretisation) -> None:
+def test_half_a_model_gives_half_the_answer(discretisation: str) -> None:
     half, whole = solved(stack(1.0, 4, discretisation)), solved(stack(1.0, 8, discretisation))
     assert half.energies.total_potential == pytest.approx(0.5 * whole.energies.total_potential, rel=1e-6)
     assert half.energies.friction == pytest.approx(0.5 * whole.energies.friction, rel=1e-4)
@@ -178,7 +177,7 @@ def test_normals_lie_in_a_plane_of_symmetry_however_the_face_is_tilted(slope: fl
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
-def test_half_a_roof_gives_half_the_answer(discretisation: Discretisation) -> None:
+def test_half_a_roof_gives_half_the_answer(discretisation: str) -> None:
     """The ridge lies in the plane of symmetry; its normals are those of both slopes together."""
     models = [tilted(0.03, cells) for cells in (4, 8)]
     pairs = [replace(model.contacts[0], discretisation=discretisation) for model in models]

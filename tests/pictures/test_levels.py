@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from fenics_contact import Body, Scene
-from fenics_contact._adaptive.levels import Level
+from fenics_contact import Body, Level, Scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain

@@ -10,9 +10,8 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact import solve_scene
+from fenics_contact import PhaseTimer, solve_scene
 from fenics_contact._base.costs import costs_of, count_flops, size_of, with_ledger
-from fenics_contact._base.progress import PhaseTimer
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.inverse import FactoredOperator
 from fenics_contact.results import Costs, PhaseCosts

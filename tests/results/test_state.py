@@ -38,7 +38,6 @@ from fenics_contact import (
     write_vtu,
 )
 from fenics_contact._equilibrium.steps import stored_state
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import ConvergenceError, InvalidInputError, MissingRequirementError
 from fenics_contact.gallery import block, cylinder, half_disc, hemisphere, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
@@ -367,7 +366,7 @@ def test_the_footprint_of_a_ball_is_round_with_the_radius_of_hertz() -> None:
 
 @pytest.mark.parametrize("discretisation", ["mortar", "node"])
 @pytest.mark.parametrize("cells", [9, 13])
-def test_contact_ends_where_the_master_ends(cells: int, discretisation: Discretisation) -> None:
+def test_contact_ends_where_the_master_ends(cells: int, discretisation: str) -> None:
     """A plate pressed all over a smaller stamp whose edges lie within its facets."""
     plate, stamp = block((0, 0, 1), (5, 4, 2), (cells, 7, 2)), block((1, 0.5, 0), (3.3, 2.7, 1), (6, 5, 3))
     scene = Scene(
@@ -384,7 +383,7 @@ def test_contact_ends_where_the_master_ends(cells: int, discretisation: Discreti
 
 
 @pytest.mark.parametrize("discretisation", ["mortar", "node"])
-def test_contact_reaches_over_nodes_that_supports_hold(discretisation: Discretisation) -> None:
+def test_contact_reaches_over_nodes_that_supports_hold(discretisation: str) -> None:
     """A pin in a tube with an overlap: the ring of nodes at its clamped end has no contact points."""
     pin, tube = cylinder(1.0, 1.5, 3, 4), cylinder(2.0, 1.5, 4, 3, hole=1.0)
     sides = Surface("pin", "outer"), Surface("tube", "inner")
@@ -467,7 +466,7 @@ def test_the_rim_lies_where_pressure_and_gap_of_a_smooth_contact_place_it() -> N
 WALL = RigidPlane((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
-def pushed(friction: Coulomb | None, discretisation: Discretisation = "node") -> Scene:
+def pushed(friction: Coulomb | None, discretisation: str = "node") -> Scene:
     """A crowned block pressed on another one and pushed along it, beside a wall without friction."""
     lower = block((0.0, 0.0, -0.7), (2.1, 1.1, 0.0), (7, 3, 2))
     upper = crowned(block((0.3, 0.0, 0.0), (1.8, 1.1, 0.9), (5, 3, 3)), 0.03)
@@ -495,7 +494,7 @@ def moved_along(state: State) -> np.ndarray:
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
 @pytest.mark.parametrize("friction", [None, Coulomb(0.2)])
 def test_slip_is_the_relative_displacement_with_and_without_friction(
-    friction: Coulomb | None, discretisation: Discretisation
+    friction: Coulomb | None, discretisation: str
 ) -> None:
     scene = pushed(friction, discretisation)
     state = solve_scene(scene, MPI.COMM_SELF, partitions=cut(scene))

@@ -24,7 +24,6 @@ from fenics_contact import (
     box_partition,
     solve_scene,
 )
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import bisection_partition
@@ -45,7 +44,7 @@ def turned(mesh: BodyMesh) -> BodyMesh:
 def stack(
     *,
     turn: bool,
-    discretisation: Discretisation = "node",
+    discretisation: str = "node",
     push: tuple[float, float, float] = (3.0, 0.0, -10.0),
     cells: tuple[int, int, int] = (4, 3, 2),
     slope: float = 0.0,

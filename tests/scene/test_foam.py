@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, Scene, Support, solve_scene
-from fenics_contact._fem.model_checks import check_hyperelastic
+from fenics_contact import Body, Scene, Support, check_hyperelastic, solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import Hyperfoam

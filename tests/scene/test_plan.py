@@ -26,7 +26,6 @@ from fenics_contact import (
     box_partition,
     solve_scene,
 )
-from fenics_contact._scene.pairs import Friction
 from fenics_contact._scene.plan import ConeKind, SolverKind
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.feti import DualSystem
@@ -36,6 +35,7 @@ from fenics_contact.materials import IsotropicElasticity, Material, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
+from tests.scenes import Friction
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 UNCUT = {"lower": (1, 1, 1), "upper": (1, 1, 1)}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fenics_contact._fem.model_checks import check_history_material
+from fenics_contact import check_history_material
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials import RambergOsgood
 from tests.scene.material_points import at_rest, deformations, in_tension, tangent_error

@@ -30,7 +30,6 @@ from fenics_contact import (
     solve_scene,
     solve_steps,
 )
-from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.design import TotalPotential
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
@@ -58,7 +57,7 @@ def test_normals_lie_in_an_oblique_plane_however_the_face_falls_away_from_it() -
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
-def test_a_turned_half_model_is_the_straight_one(discretisation: Discretisation) -> None:
+def test_a_turned_half_model_is_the_straight_one(discretisation: str) -> None:
     straight, oblique = (solved(stack(turn=turn, discretisation=discretisation)) for turn in (False, True))
     for name in ("lower", "upper"):
         expected = straight.gather_displacement(name) @ TURN.T
@@ -209,7 +208,7 @@ def test_load_steps_move_rollers_and_remember_slip() -> None:
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
-def test_large_deformations_slide_in_a_plane_of_symmetry(discretisation: Discretisation) -> None:
+def test_large_deformations_slide_in_a_plane_of_symmetry(discretisation: str) -> None:
     """With sliding contact, friction and a pressure that follows."""
     rubber = NeoHooke(10.0, 0.3)
 

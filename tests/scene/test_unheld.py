@@ -33,7 +33,6 @@ from fenics_contact import (
 from fenics_contact._fem.mechanics import HyperelasticMechanics
 from fenics_contact._large_deformations.newton import NotHeldError
 from fenics_contact._pairing.search import find_contact_points, without_rounding
-from fenics_contact._scene.pairs import Friction
 from fenics_contact.errors import ConvergenceError, InfeasibleError, LoadStepError
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.inverse import LocalKind
@@ -44,7 +43,7 @@ from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp import FaceNewton, Smalse
 from tests.equilibrium.press_fits import Disc, press_fit
 from tests.equilibrium.stacks import RUBBER, TURN, cut, turned_stack
-from tests.scenes import block_on_plane, two_blocks
+from tests.scenes import Friction, block_on_plane, two_blocks
 
 
 def cube_on_floor(n: int) -> Scene:

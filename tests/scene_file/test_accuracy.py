@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import read_scene_file
-from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, solve_to
+from fenics_contact import AccurateResult, Level, Limits, read_scene_file, solve_to
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact.design import ContactArea, Movement, Objective, PeakPressure, StrainEnergy, StressNear

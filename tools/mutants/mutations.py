@@ -14,7 +14,7 @@ CONIC = (
 
 PARTS = "tests/accuracy/test_certificate.py"
 NARROW = "tests/surfaces/test_true_surface.py"
-RIGID = "tests/equilibrium/test_rigid_surfaces.py"
+RIGID = "tests/feti/test_rigid_surfaces.py"
 
 MUTATIONS = (
     *DESIGN_MUTATIONS,
@@ -25,28 +25,28 @@ MUTATIONS = (
         "_kinematics/revolution.py",
         "u[0] / x[0], self",
         "0 * u[0] / x[0], self",
-        ("tests/axisymmetry/test_small_strain.py::test_recovered_stress_of_a_patch_is_exact_on_the_axis",),
+        ("tests/fem/test_axisymmetric.py::test_recovered_stress_of_a_patch_is_exact_on_the_axis",),
     ),
     Mutation(
         "a turn about the axis strains bodies of revolution",
         "_kinematics/torsion.py",
         "-turn",
         "0",
-        ("tests/axisymmetry/test_torsion.py::test_stiffness_annihilates_translation_and_turn",),
+        ("tests/fem/test_torsion.py::test_stiffness_annihilates_translation_and_turn",),
     ),
     Mutation(
         "nothing rubs around the axis",
         "_pairing/torsion.py",
         "np.broadcast_to([0.0, 0.0, 1.0]",
         "np.broadcast_to([0.0, 0.0, 0.0]",
-        ("tests/axisymmetry/test_torsion.py::test_a_disc_turned_on_a_plate_has_the_torque_of_its_pressure",),
+        ("tests/fem/test_torsion.py::test_a_disc_turned_on_a_plate_has_the_torque_of_its_pressure",),
     ),
     Mutation(
         "quadratic slaves move in mortar contact as their nodes do",
         "_pairing/mortar/coupling.py",
         "None if slave.whole is None else _scaled(means[node])",
         "None",
-        ("tests/equilibrium/test_quadratic_mortar.py::test_a_uniform_pressure_passes_between_edges",),
+        ("tests/pairing/test_quadratic_mortar.py::test_a_uniform_pressure_passes_between_edges",),
     ),
     Mutation(
         "bodies overlap by mortar where a surface turns away from the other one",
@@ -60,7 +60,7 @@ MUTATIONS = (
         "_kinematics/revolved_measure.py",
         "2 * np.pi * weight * np.einsum(\"nqk,nk->nq\", functions, first)",
         "weight",
-        ("tests/axisymmetry/test_small_strain.py::test_pressure_is_transmitted_exactly_by_mortar",),
+        ("tests/fem/test_axisymmetric.py::test_pressure_is_transmitted_exactly_by_mortar",),
     ),
     Mutation(
         "changes of volume leave out the way around the axis",
@@ -68,7 +68,7 @@ MUTATIONS = (
         "np.asarray(self.around(radii) * jacobians(points, cells, positions))",
         "jacobians(points, cells, positions)",
         (
-            "tests/axisymmetry/test_large_strain.py"
+            "tests/large_deformations/test_axisymmetric.py"
             "::test_pressure_that_follows_inflates_a_tube_as_theory_says[quadrilateral]",
         ),
     ),
@@ -84,7 +84,7 @@ MUTATIONS = (
         "results/contact.py",
         "return self.normal_force / self.area",
         "return 1.004 * self.normal_force / self.area",
-        ("tests/equilibrium/test_state.py::test_pressures_integrate_to_the_load",),
+        ("tests/results/test_state.py::test_pressures_integrate_to_the_load",),
     ),
     Mutation(
         "Tresca's bound is too large by a percent",
@@ -119,21 +119,21 @@ MUTATIONS = (
         "_equilibrium/warnings.py",
         "if error > SHARE * moved:",
         "if error > 10.0 * SHARE * moved:",
-        ("tests/equilibrium/test_unheld.py::test_a_roller_is_told_of_by_facets_alone",),
+        ("tests/scene/test_unheld.py::test_a_roller_is_told_of_by_facets_alone",),
     ),
     Mutation(
         "no body is ever too loose",
         "_equilibrium/static_admissibility.py",
         "LEFT = 1e-8",
         "LEFT = 1e3",
-        ("tests/equilibrium/test_held.py::test_a_body_pulled_off_its_floor_is_named_with_the_way_it_goes",),
+        ("tests/scene/test_held.py::test_a_body_pulled_off_its_floor_is_named_with_the_way_it_goes",),
     ),
     Mutation(
         "strain energy is too large by 0.2 percent",
         "results/state.py",
         "strained = 0.5 * internal",
         "strained = 0.501 * internal",
-        ("tests/equilibrium/test_state.py::test_the_primal_energy_is_the_dual_energy_and_contains_the_friction",),
+        ("tests/results/test_state.py::test_the_primal_energy_is_the_dual_energy_and_contains_the_friction",),
     ),
     Mutation(
         "von Mises stress is too small by 0.3 percent",
@@ -147,14 +147,14 @@ MUTATIONS = (
         "results/fields.py",
         "(gradients[:, j, i] if i != j else 0.0)",
         "0.0",
-        ("tests/equilibrium/test_units.py::test_the_stress_of_a_thick_cylinder_converges_to_lame",),
+        ("tests/results/test_units.py::test_the_stress_of_a_thick_cylinder_converges_to_lame",),
     ),
     Mutation(
         "reactions contain what contact exerts on prescribed components",
         "results/forces.py",
         "torn.force(multiplier)) - joined",
         "torn.force(multiplier))",
-        ("tests/equilibrium/test_resultants.py::test_all_forces_balance",),
+        ("tests/results/test_resultants.py::test_all_forces_balance",),
     ),
     Mutation(
         "nodes between materials show the smaller stress",
@@ -171,7 +171,7 @@ MUTATIONS = (
         "_fem/loads.py",
         "moment = lever + (",
         "moment = 0.0 * lever + (",
-        ("tests/equilibrium/test_resultants.py::test_a_force_at_a_point_is_held_there",),
+        ("tests/results/test_resultants.py::test_a_force_at_a_point_is_held_there",),
     ),
     Mutation(
         "loads at points of rigid surfaces are forgotten",
@@ -208,7 +208,7 @@ MUTATIONS = (
         "results/forces.py",
         "own[:, None] * components",
         "(own > 0)[:, None] * components",
-        ("tests/equilibrium/test_resultants.py::test_supports_that_share_nodes_share_their_reaction",),
+        ("tests/results/test_resultants.py::test_supports_that_share_nodes_share_their_reaction",),
     ),
     Mutation(
         "starts from coarser meshes glue against all contact forces",
@@ -297,7 +297,7 @@ MUTATIONS = (
         "feti/ties.py",
         "points = ties.part(~are_sliding(scene.ties, ties.pair))",
         "points = ties",
-        ("tests/equilibrium/test_ties.py::test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to",),
+        ("tests/feti/test_ties.py::test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to",),
     ),
     Mutation(
         "an answer need not be in balance",
@@ -311,7 +311,7 @@ MUTATIONS = (
         "_pairing/points.py",
         "HELD = 1e-6",
         "HELD = 1e-5",
-        ("tests/equilibrium/test_symmetry_planes.py::test_what_is_left_free_by_rounding_alone_is_held",),
+        ("tests/pairing/test_symmetry_planes.py::test_what_is_left_free_by_rounding_alone_is_held",),
     ),
     Mutation(
         "subdomains that are almost alike share factors",
@@ -339,7 +339,7 @@ MUTATIONS = (
         "feti/condensation.py",
         "unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))",
         "unit = 1.0",
-        ("tests/equilibrium/test_units.py::test_subdomains_are_factored_alike_in_all_units",),
+        ("tests/results/test_units.py::test_subdomains_are_factored_alike_in_all_units",),
     ),
     Mutation(
         "Tresca's bound and the load are in two units",
@@ -347,7 +347,7 @@ MUTATIONS = (
         "np.minimum(torn.groups.slips.tresca_bound / scale, largest)",
         "np.minimum(torn.groups.slips.tresca_bound, largest)",
         (
-            "tests/equilibrium/test_held.py::test_the_limit_of_friction_does_not_depend_on_the_units"
+            "tests/scene/test_held.py::test_the_limit_of_friction_does_not_depend_on_the_units"
             "[1e-06-1e-06-friction1]",
         ),
     ),
@@ -357,7 +357,7 @@ MUTATIONS = (
         "start = master.points[nodes[:, 0]]",
         "start = 0.0 * master.points[nodes[:, 0]]",
         (
-            "tests/equilibrium/test_units.py::test_no_contact_point_is_lost_far_from_the_origin[3-hexahedron-node]",
+            "tests/results/test_units.py::test_no_contact_point_is_lost_far_from_the_origin[3-hexahedron-node]",
         ),
     ),
     Mutation(
@@ -458,7 +458,7 @@ MUTATIONS = (
         "(0.75 * spread)",
         "(1.0 * spread)",
         (
-            "tests/equilibrium/test_state.py::"
+            "tests/results/test_state.py::"
             "test_the_rim_lies_where_pressure_and_gap_of_a_smooth_contact_place_it",
         ),
     ),

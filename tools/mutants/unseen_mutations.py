@@ -66,14 +66,14 @@ UNSEEN_MUTATIONS = (
         "_scene/constraints.py",
         "points.mean(axis=0) - start.mean(axis=0)",
         "points[0] - start[0]",
-        ("tests/equilibrium/test_linear_constraints.py::test_partners_are_found_in_any_order_of_the_nodes",),
+        ("tests/feti/test_linear_constraints.py::test_partners_are_found_in_any_order_of_the_nodes",),
     ),
     Mutation(
         "the area of a section is that of the facets that it cuts",
         "_scene/preloads.py",
         "vector_areas(mesh.points, facets) @ self.normal(mesh)",
         "np.linalg.norm(vector_areas(mesh.points, facets), axis=1)",
-        ("tests/equilibrium/test_preloads.py::test_the_area_of_an_oblique_section_is_that_across_its_normal",),
+        ("tests/feti/test_preloads.py::test_the_area_of_an_oblique_section_is_that_across_its_normal",),
     ),
     Mutation(
         "rims of bodies with a chart move by whole bulges",

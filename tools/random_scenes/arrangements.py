@@ -19,7 +19,7 @@ from fenics_contact import (
     Tresca,
 )
 from fenics_contact._scene.obstacles import RigidObstacle
-from fenics_contact._scene.pairs import Friction
+from tests.scenes import Friction
 from tools.random_scenes.bodies import Grown, box, in_plane, round_body
 from tools.random_scenes.dice import Dice
 

@@ -8,8 +8,7 @@ import time
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact._adaptive.levels import Limits, solve_to
-from fenics_contact._adaptive.quantities import quantity
+from fenics_contact import Limits, quantity, solve_to
 from fenics_contact.errors import ConvergenceError, FenicsContactError
 from tools.random_scenes.corners import Corners, corners
 from tools.random_scenes.judge import Outcome, Verdict, placed

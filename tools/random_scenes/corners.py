@@ -17,6 +17,7 @@ from fenics_contact import (
     Body,
     BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
     RigidPlane,
     RigidSphere,
@@ -24,10 +25,9 @@ from fenics_contact import (
     Support,
     Surface,
     Traction,
+    quantity,
 )
 from fenics_contact._adaptive.goal_errors import value_of
-from fenics_contact._adaptive.quantities import quantity
-from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact.gallery import rectangle_lattice
 from fenics_contact.materials import PlaneStrain
 from fenics_contact.mesh import quadratic

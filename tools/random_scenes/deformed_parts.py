@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from fenics_contact import BodyMesh, Coulomb
-from fenics_contact._scene.pairs import Friction
 from fenics_contact.gallery import box_lattice, half_disc, hemisphere, rectangle_lattice
 from fenics_contact.materials import (
     FinitePlasticity,
@@ -21,6 +20,7 @@ from fenics_contact.materials import (
     StVenantKirchhoff,
 )
 from fenics_contact.mesh import boundary_faces, quadratic
+from tests.scenes import Friction
 from tools.random_scenes.dice import Dice
 from tools.random_scenes.frame import Frame
 

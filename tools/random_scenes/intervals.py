@@ -9,11 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact._adaptive.levels import AccurateResult, Limits, solve_to, unknowns_of
-from fenics_contact._adaptive.quantities import quantity
+from fenics_contact import AccurateResult, ContactProblem, Limits, Scene, quantity, solve_to
+from fenics_contact._adaptive.levels import unknowns_of
 from fenics_contact._adaptive.refined_scene import refine_scene
-from fenics_contact._equilibrium.problem import ContactProblem
-from fenics_contact._scene.scene import Scene
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.objective import Objective
 from fenics_contact.errors import ConvergenceError, FenicsContactError

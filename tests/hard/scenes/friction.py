@@ -22,12 +22,11 @@ from fenics_contact import (
     Traction,
     Tresca,
 )
-from fenics_contact._scene.pairs import Friction
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from tests.hard.scenes.parts import FLOOR, cubes, force
-from tests.scenes import SOFT, block_on_plane, pressed_block, stack
+from tests.scenes import SOFT, Friction, block_on_plane, pressed_block, stack
 from tools.hard_cases.invariants import violations
 from tools.hard_cases.transform import turned
 from tools.hard_cases.trial import Answer, Trial, cut_trial, failing_trial, trial
