@@ -131,10 +131,7 @@ class FormLibrary:
             for body in scene.bodies.values():
                 for material in body.materials:
                     element = body.element
-                    if (
-                        isinstance(material, Hyperelasticity)
-                        and (material, element) not in self._deformable
-                    ):
+                    if isinstance(material, Hyperelasticity) and (material, element) not in self._deformable:
                         check_deformed(material, element, self._templates)
                         self._deformable.add((material, element))
 

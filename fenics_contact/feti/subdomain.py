@@ -508,9 +508,7 @@ def kernel_of_body(body: Body, points: np.ndarray, materials: Sequence[Material]
     return common_kernel(body.materials if materials is None else materials, points, body.kinematics)
 
 
-def common_kernel(
-    materials: Sequence[Material], points: np.ndarray, kinematics: Kinematics
-) -> np.ndarray:
+def common_kernel(materials: Sequence[Material], points: np.ndarray, kinematics: Kinematics) -> np.ndarray:
     """Return the modes without energy of a body of several materials at points, (n, components, n_modes)."""
     # A motion without energy has none in any of the materials.
     every = (kernel_of(material, points, kinematics) for material in materials)

@@ -124,9 +124,7 @@ CASES = {
     "Tresca's law": Case(lambda: scenes.two_blocks(Tresca(0.8)), boxes(2, 2, 1)),
     "Coulomb's law": Case(lambda: scenes.pressed_block(Coulomb(0.3)), boxes(3, 1, 1)),
     "a body that friction holds": Case(lambda: scenes.two_blocks(Coulomb(0.38)), boxes(2, 1, 1)),
-    "bodies that float on each other": Case(
-        lambda: scenes.stack(Coulomb(0.4), Coulomb(0.5)), boxes(2, 1, 1)
-    ),
+    "bodies that float on each other": Case(lambda: scenes.stack(Coulomb(0.4), Coulomb(0.5)), boxes(2, 1, 1)),
     "nodes in two pairs": Case(lambda: scenes.cornered_block(Coulomb(0.3)), boxes(2, 1, 1)),
     "a mortar pair": Case(effect_cases.mortar, graph(4)),
     # What is left between parts of the stiff body the preconditioner closes at ten times the least energy.

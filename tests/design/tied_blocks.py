@@ -38,9 +38,7 @@ def _boxes(cell: str) -> tuple[BodyMesh, BodyMesh]:
     return lower_block, block((0.12, 0.08, 1.0), (1.85, 0.91, 1.6), (4, 3, 1), cell)
 
 
-def capped(
-    cell: str, *, sliding: bool = False, order: int = 1, discretisation: str = "node"
-) -> Scene:
+def capped(cell: str, *, sliding: bool = False, order: int = 1, discretisation: str = "node") -> Scene:
     """A crowned block that a floor holds, and a cap on its rounded top that is pressed."""
     below, above = (quadratic(mesh) if order == 2 else mesh for mesh in _boxes(cell))
     below, dim = crowned(below, 0.02), below.dim

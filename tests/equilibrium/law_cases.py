@@ -107,9 +107,7 @@ def tilted_block(closure: ClosureLaw | None, friction: Coulomb | None) -> Scene:
     )
 
 
-def pressed_and_sheared(
-    material: Material, discretisation: str, size: float, cells: int = 2
-) -> Scene:
+def pressed_and_sheared(material: Material, discretisation: str, size: float, cells: int = 2) -> Scene:
     """A block on a wider one, its top moved down and aside; nothing slips."""
     bodies = {
         "low": Body(block((-1.0, -1.0, -1.0), (2.0, 2.0, 0.0), (3, 3, 1)), material),

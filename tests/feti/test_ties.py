@@ -109,9 +109,7 @@ def test_a_sliding_tie_holds_the_normal_direction_alone() -> None:
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
 @pytest.mark.parametrize("sliding", [True, False])
-def test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to(
-    sliding: bool, discretisation: str
-) -> None:
+def test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to(sliding: bool, discretisation: str) -> None:
     """The upper block is moved along x as a whole; what it does to the lower one is all that deforms."""
     moved = [Support("lower", "z0"), Support("upper", "z1", (0.1, 0.0, 0.0))]
     ties = [Tie(*FACES, sliding=sliding, discretisation=discretisation)]

@@ -125,14 +125,18 @@ LARGE_MUTATIONS = (
         "_large_deformations/equations.py",
         "FORCE_FLOOR = 1e-4",
         "FORCE_FLOOR = 1e-1",
-        ("tests/large_deformations/test_newton_steps.py::test_a_small_load_on_a_body_that_is_moved_far_is_balanced",),
+        (
+            "tests/large_deformations/test_newton_steps.py::test_a_small_load_on_a_body_that_is_moved_far_is_balanced",
+        ),
     ),
     Mutation(
         "pressures of bodies that deform much are by undeformed area",
         "_pairing/sliding/means.py",
         "np.where(self.much, self.now, self.before) * self.share",
         "self.before * self.share",
-        ("tests/large_deformations/test_true_pressure.py::test_an_incompressible_block_presses_with_its_stress",),
+        (
+            "tests/large_deformations/test_true_pressure.py::test_an_incompressible_block_presses_with_its_stress",
+        ),
     ),
     Mutation(
         "points at the rim of the master have all of their area",

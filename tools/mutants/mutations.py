@@ -58,7 +58,7 @@ MUTATIONS = (
     Mutation(
         "mortar integrals do not go around the axis",
         "_kinematics/revolved_measure.py",
-        "2 * np.pi * weight * np.einsum(\"nqk,nk->nq\", functions, first)",
+        '2 * np.pi * weight * np.einsum("nqk,nk->nq", functions, first)',
         "weight",
         ("tests/fem/test_axisymmetric.py::test_pressure_is_transmitted_exactly_by_mortar",),
     ),
@@ -427,7 +427,9 @@ MUTATIONS = (
         "_equilibrium/deformed.py",
         "points.carry_slip(before.contact.total_slip, old)",
         "points.carry_tangential(before.contact.total_slip, old)",
-        ("tests/large_deformations/test_prescribed_motion.py::test_slip_of_earlier_steps_turns_about_the_normal",),
+        (
+            "tests/large_deformations/test_prescribed_motion.py::test_slip_of_earlier_steps_turns_about_the_normal",
+        ),
     ),
     Mutation(
         "the dilatation of hexahedra27 is constant in a cell",

@@ -59,7 +59,9 @@ UNSEEN_MUTATIONS = (
         "_scene/surface_laws.py",
         'np.searchsorted(self.slip, slip, side="right")',
         'np.searchsorted(self.slip, slip, side="left")',
-        ("tests/equilibrium/test_friction_by_slip.py::test_the_slope_at_a_corner_of_a_table_is_that_beyond_it",),
+        (
+            "tests/equilibrium/test_friction_by_slip.py::test_the_slope_at_a_corner_of_a_table_is_that_beyond_it",
+        ),
     ),
     Mutation(
         "partners are where the first node of both sides lies",
