@@ -265,10 +265,9 @@ class ContactProblem:
                 if linear or refinements is not None:
                     previous = previous.starting(scene, first, refinements)
             state = equilibria.solve(scene, previous.reusing(scene, self.state), wanted)
-        self.state = state
         with self.timer.phase("state"):
-            self._warnings.warn(state, design=design)
-        return state
+            self.state = self._warnings.examined(state, design=design)
+        return self.state
 
     def _kind(self, scene: Scene, *, sensitivity: bool) -> SolverKind:
         """Return how a scene is solved, also whether by large deformations. Collective."""

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum, auto
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -32,6 +33,9 @@ from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.resolution import BetweenNodes, FacetsOutside, PeakDoubt
 from fenics_contact.results.state import State
+
+if TYPE_CHECKING:
+    from fenics_contact.results.deformed_state import AnyState
 
 #: Errors up to this share of what moves are small.
 SHARE = 0.1
@@ -90,25 +94,24 @@ class ContactWarnings:
         self._rotations = dict[str, tuple[BodyMesh, float]]()
         self._outlines: dict[str, tuple[BodyMesh, Outline]] = {}
 
-    def warn(self, state: State, *, design: bool = False) -> None:
-        """Warn of what is doubtful about a state. Collective."""
+    def examined(self, state: AnyState, *, design: bool = False) -> AnyState:
+        """Return a state with its doubts about peaks, and warn of what is doubtful. Collective."""
         if self._held is not None:
             self._held.clear()
             self._given.clear()
         if isinstance(state, LinearState):
             if design and self._points is not None:
-                return
+                return state
             found, peaks = self._doubts(state)
             for doubt in found:
                 if not (design and doubt.kind is Kind.OVERLAP):
                     self._log_doubt(state, doubt)
-            object.__setattr__(state, "peak_doubts", peaks)
         else:
-            self._warn_of_deformed(state)
+            peaks = self._doubts_of_deformed(state)
         self._warn_of_large_rotations(state)
-        self._warn_of_passing_bodies(state)
+        return replace(state, peak_doubts=(*peaks, *self._passing_bodies(state)))
 
-    def _warn_of_deformed(self, state: State) -> None:
+    def _doubts_of_deformed(self, state: State) -> tuple[PeakDoubt, ...]:
         """Warn of pairs of nonlinear materials that slide too far or are too small for cells. Collective."""
         peaks, scene, pressed_in = list[PeakDoubt](), state.scene, _indentation(state)
         for number, pair in enumerate(scene.contacts):
@@ -126,7 +129,7 @@ class ContactWarnings:
             if peak := coarse_peak(state, number, pressed_in):
                 peaks.append(peak)
                 self._log_doubt(state, Doubt(number, Kind.PEAK, peak.warning, is_small=True))
-        object.__setattr__(state, "peak_doubts", tuple(peaks))
+        return tuple(peaks)
 
     def warn_of_values(self, scene: Scene, comm: MPI.Comm) -> None:
         """Warn of constants of a scene that are hardly meant, of each once, also on other meshes."""
@@ -227,7 +230,7 @@ class ContactWarnings:
             self._rotations[name] = mesh, sum(both)
         return self._rotations[name][1]
 
-    def _warn_of_passing_bodies(self, state: State) -> None:
+    def _passing_bodies(self, state: State) -> list[FacetsOutside]:
         """Warn of bodies with facets in one another, or that touch without a pair or tie. Collective.
 
         Only bodies whose bounding boxes come near each other are gathered; ranks share their facets.
@@ -249,7 +252,7 @@ class ContactWarnings:
                 self._log(state, part.bodies, words)
             passing = [pair for pair in scene.contacts if whole[2] and part.is_of(pair)]
             outside += [FacetsOutside(pair.place, whole[2]) for pair in passing]
-        object.__setattr__(state, "peak_doubts", (*state.peak_doubts, *outside))
+        return outside
 
     def _outline(self, scene: Scene, name: str) -> Outline:
         """Return the boundary of a body, which meshes of the same cells share."""
