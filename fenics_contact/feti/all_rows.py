@@ -113,10 +113,6 @@ class RowGroups:
         """Return what prescribed displacements are in all rows of free ones, shape (total,), [length]."""
         return np.concatenate([each.of_supports(prescribed) for each in self.members])
 
-    def driven(self, change: np.ndarray) -> np.ndarray:
-        """Return by how much c of all rows changes with prescribed displacements, (total,), [length]."""
-        return np.concatenate([each.driven(change) for each in self.members])
-
     @property
     def compliance(self) -> np.ndarray:
         """The diagonal of C of all rows, shape (total,), [length / force]."""

@@ -229,9 +229,11 @@ class TornSystem:
 
     def moved_further(self, change: np.ndarray) -> TornSystem:
         """Return a system whose supports have moved, (n_nodes, dim), along axes of nodes, 0 where free."""
-        owned = self.numbering.owned
-        right = self.right + self.groups.driven(change)[owned]
-        return replace(self, right=right, supported=self.supported + self.groups.of_supports(change)[owned])
+        groups, owned = self.groups, self.numbering.owned
+        supported = groups.of_supports(change)
+        right = -supported
+        right[groups.rows_of(groups.glued)] = groups.glued.driven(change)
+        return replace(self, right=self.right + right[owned], supported=self.supported + supported[owned])
 
     def sliding(self, displacement: np.ndarray) -> np.ndarray:
         """Return the tangential displacement of points without friction, [length]. Collective.
