@@ -19,15 +19,28 @@ from fenics_contact.decks.couplings import (
     read_driven,
     require_own_nodes,
 )
-from fenics_contact.decks.equations import Equation, read_equations
 from fenics_contact.decks.initial_stress import TensorGiven, read_initial
 from fenics_contact.decks.materials import MaterialCards, read_materials
-from fenics_contact.decks.multi_point import Mean, mean_equations, read_means, read_points, shared_out
+from fenics_contact.decks.multi_point import (
+    Equation,
+    Mean,
+    mean_equations,
+    read_equations,
+    read_means,
+    read_points,
+    shared_out,
+)
 from fenics_contact.decks.pair_changes import PairChange, read_changes
-from fenics_contact.decks.regions import split_sections
 from fenics_contact.decks.steps import DeckSteps, read_steps
 from fenics_contact.decks.vocabulary import WITHOUT_EFFECT
-from fenics_contact.readers.deck_bodies import Component, Exterior, Section, components, read_sections
+from fenics_contact.readers.deck_bodies import (
+    Component,
+    Exterior,
+    Section,
+    components,
+    read_sections,
+    split_sections,
+)
 from fenics_contact.readers.deck_cards import Card, Origin
 from fenics_contact.readers.deck_mesh import DeckMesh, read_mesh_cards
 

@@ -22,8 +22,7 @@ from fenics_contact.decks.names import names_of
 from fenics_contact.decks.pairs import Pairs, pairs_of
 from fenics_contact.decks.supports import SupportBuilder
 from fenics_contact.decks.tables import Print, PrintTable
-from fenics_contact.decks.unknown import refuse_unknown
-from fenics_contact.decks.vocabulary import PROCEDURES
+from fenics_contact.decks.vocabulary import PROCEDURES, refuse_unknown
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.readers.deck_assembly import read_cards

@@ -24,10 +24,9 @@ from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.couplings import Driven
 from fenics_contact.decks.initial_stress import relieved
 from fenics_contact.decks.names import Forced
-from fenics_contact.decks.regions import region_names
 from fenics_contact.decks.steps import Acting, Instant
 from fenics_contact.materials.hyperelastic import is_nonlinear
-from fenics_contact.readers.deck_bodies import Component
+from fenics_contact.readers.deck_bodies import Component, region_names
 
 
 @dataclass(frozen=True, eq=False)

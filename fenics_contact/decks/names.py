@@ -12,7 +12,7 @@ import numpy as np
 from fenics_contact.decks.cards import DeckCards
 from fenics_contact.decks.contact import Sides
 from fenics_contact.decks.couplings import Driven, by_node
-from fenics_contact.decks.equations import Equation
+from fenics_contact.decks.multi_point import Equation
 from fenics_contact.decks.steps import Acting, DeckSteps, Held
 from fenics_contact.decks.ties import reach_of
 from fenics_contact.readers.deck_cards import Card

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.decks.equations import Equation
 from fenics_contact.decks.initial_stress import kind_of
+from fenics_contact.decks.multi_point import Equation
 from fenics_contact.decks.vocabulary import PRINT_CARDS, PROCEDURES
 from fenics_contact.readers.deck_cards import Card, DeckError, plain
 from fenics_contact.readers.deck_mesh import DeckMesh
