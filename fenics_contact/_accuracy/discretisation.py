@@ -159,7 +159,7 @@ def _write(material: Material, element: Element) -> Written:
     def energy(trial: Expr) -> Expr:
         return material.stiffness(trial, trial, parameters)
 
-    density = element.kinematics.of_gradient(energy, difference, element)
+    density = element.kinematics.of_gradient(energy, difference, element.x, element.constant)
     return element.integrand(density * q) * measure, parameters, (u, *rows)
 
 

@@ -17,8 +17,8 @@ from fenics_contact._fem.templates import (
     coefficient_shape,
     quadrature_degree,
 )
+from fenics_contact._kinematics.base import Gradients
 from fenics_contact._kinematics.element import Element
-from fenics_contact._kinematics.gradients import Gradients
 from fenics_contact.materials.hyperelastic import has_mean_dilatation
 from fenics_contact.mesh.cell_types import quadrature, shape_gradients, shape_values
 from fenics_contact.mesh.quality import determinants

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import ufl
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,7 @@ class Integration:
         """Return the degree of the quadrature by that of linear cells and the order of the cells."""
         return linear * order
 
-    def stiffness(self, form: Any, in_full: Callable[[Any], Any]) -> Any:
+    def stiffness(self, form: ufl.Form, in_full: Callable[[ufl.Form], ufl.Form]) -> ufl.Form:
         """Return a stiffness (UFL) by this integration, of one that has its degree.
 
         `in_full`: returns a form in full integration.
@@ -53,9 +56,16 @@ class Stabilised(Reduced):
     share: float = 1e-6
     name = "reduced, stabilised"
 
-    def stiffness(self, form: Any, in_full: Callable[[Any], Any]) -> Any:
+    def stiffness(self, form: ufl.Form, in_full: Callable[[ufl.Form], ufl.Form]) -> ufl.Form:
         """Return the stiffness with its share of full integration."""
         return (1.0 - self.share) * form + self.share * in_full(form)
 
 
 FULL = Integration()
+
+
+def integration_of(name: str, cuts: object) -> Integration:
+    """Return the integration called "full" or "reduced"; `cuts`: where a section may be one cell across."""
+    if name == "full":
+        return FULL
+    return Stabilised() if cuts else Reduced()

@@ -19,6 +19,13 @@ class Measure:
         """Return the measure per measure in coordinates, (...) or UFL, by first coordinates, [length]."""
         return 1.0
 
+    def around_closed(self, first: np.ndarray, closed: np.ndarray, share: np.ndarray) -> np.ndarray | float:
+        """Return `around` in the middle of the closed share of facets, (n,).
+
+        `first`, `closed`: first coordinates and marks of their corners, (n, corners).
+        """
+        return 1.0
+
     def weights(self, weight: np.ndarray, functions: np.ndarray, first: np.ndarray) -> np.ndarray:
         """Return weights of the points of cells on facets, shape (n, q), as weights of a quadrature.
 

@@ -12,8 +12,10 @@ import numpy as np
 from fenics_contact._base.checks import brief, checked
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._kinematics.base import Kinematics
-from fenics_contact._kinematics.choice import integration_of, kinematics_of
 from fenics_contact._kinematics.element import Element
+from fenics_contact._kinematics.integration import integration_of
+from fenics_contact._kinematics.revolution import Revolution
+from fenics_contact._kinematics.torsion import Torsion
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material, thickness_of
@@ -73,7 +75,7 @@ class Body:
         if isinstance(self.material, Mapping):
             _check_regions(self.mesh, self.material)
         for material in self.materials:
-            _check_material(material, self.mesh.dim, self.axisymmetric)
+            _check_material(material, self.kinematics)
         if self.has_thickness and any(thickness_of(each) is None for each in self.materials):
             raise InvalidInputError(
                 "all materials of a body must have a thickness or none, got "
@@ -98,12 +100,14 @@ class Body:
     @property
     def kinematics(self) -> Kinematics:
         """What its displacement consists of, and how areas and volumes are measured."""
-        return kinematics_of(self.mesh.dim, self.axisymmetric, self.torsion)
+        if self.torsion:
+            return Torsion()
+        return Revolution() if self.axisymmetric else Kinematics(self.mesh.dim)
 
     @property
     def element(self) -> Element:
         """The finite element for which its forms are written."""
-        integration = integration_of(self.integration, thin=bool(self.mesh.cuts))
+        integration = integration_of(self.integration, self.mesh.cuts)
         return Element(self.mesh.cell_type, self.kinematics, integration)
 
     @property
@@ -154,9 +158,8 @@ class Body:
     @property
     def in_words(self) -> str:
         """Its cells and materials in a few words."""
-        turned = ", a body of revolution" * self.axisymmetric + " that may twist" * self.torsion
         materials = ", ".join(type(each).__name__ for each in self.materials)
-        return f"{self.mesh.cells_in_words} of {materials}{turned}"
+        return f"{self.mesh.cells_in_words} of {materials}{self.kinematics.in_words}"
 
     @property
     def material_of_cells(self) -> np.ndarray:
@@ -212,7 +215,7 @@ def _needed(material: type) -> list[str]:
     return [each.name for each in signature(material).parameters.values() if each.default is each.empty]
 
 
-def _check_material(material: Material, dim: int, axisymmetric: bool) -> None:
+def _check_material(material: Material, kinematics: Kinematics) -> None:
     if isinstance(material, type):
         raise InvalidInputError(
             f"a material must have its constants, got the class {material.__name__}: write "
@@ -232,17 +235,8 @@ def _check_material(material: Material, dim: int, axisymmetric: bool) -> None:
             f"parameters of {name} must be a sequence of numbers, got {brief(material.parameters)}: "
             "return a tuple, with a comma behind a single one"
         )
-    if axisymmetric and 3 not in material.dims:
-        raise InvalidInputError(
-            f"the material of a body of revolution must be one of space, {name} is for {material.dims}: use "
-            "IsotropicElasticity, OrthotropicElasticity or others that plane bodies cannot have"
-        )
-    if not axisymmetric and dim not in material.dims:
-        raise InvalidInputError(
-            f"the material must be made for the dimension of the mesh, {name} is for {material.dims} and the "
-            f"mesh has {dim}: use PlaneStrain or PlaneStress in the plane, IsotropicElasticity or "
-            "OrthotropicElasticity in space"
-        )
+    if kinematics.material_dim not in material.dims:
+        raise InvalidInputError(kinematics.needed_material.format(name=name, dims=material.dims))
     try:
         hash(material)
     except TypeError as error:

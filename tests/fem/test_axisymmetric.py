@@ -31,7 +31,7 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact import _cli as cli
-from fenics_contact._kinematics.revolved_measure import RevolvedMeasure
+from fenics_contact._kinematics.revolution import RevolvedMeasure
 from fenics_contact._surfaces.facets import bearing_areas, nodal_areas
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle

@@ -25,8 +25,7 @@ from fenics_contact._fem.composition import Composition
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.mechanics import HistoryMechanics
 from fenics_contact._kinematics.element import Element
-from fenics_contact._kinematics.revolution import Revolution
-from fenics_contact._kinematics.revolved_measure import RevolvedMeasure
+from fenics_contact._kinematics.revolution import Revolution, RevolvedMeasure
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
 from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back, weight_derivatives

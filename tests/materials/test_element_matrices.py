@@ -22,13 +22,13 @@ from fenics_contact import (
     ThermalStrain,
     Traction,
     Ufl,
-    _dolfinx,
     box_partition,
     solve_scene,
 )
 from fenics_contact._fem.composition import integrate
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.templates import Constants, volume_measure
+from fenics_contact._kinematics.element import plain_element
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.materials import (
@@ -375,13 +375,14 @@ if comm.rank == 0:
 
 
 def signature(material: Material) -> str:
-    space = _dolfinx.displacement_space("hexahedron")
+    element = plain_element("hexahedron")
+    space = element.displacements
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
 
     def work(m: Material, constants: Constants) -> ufl.core.expr.Expr:
         return m.stiffness(u, v, constants)
 
-    form, _ = integrate((material,), "hexahedron", work, volume_measure("hexahedron"))
+    form, _ = integrate((material,), element, work, volume_measure(element))
     return str(form.signature())
 
 

@@ -14,6 +14,7 @@ from mpi4py import MPI
 from fenics_contact import Body, Scene, check_history_material, check_hyperelastic
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.model_checks import check_kernel, check_model
+from fenics_contact._kinematics.element import plain_element
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -207,7 +208,8 @@ def test_a_process_checks_a_material_once_and_an_odd_one_every_time(monkeypatch:
 
     monkeypatch.setattr("fenics_contact._fem.forms.check_model", noted)
     one, other, odd = IsotropicElasticity(123.0, 0.27), IsotropicElasticity(321.0, 0.27), Model(shear=-0.2)
-    first = [prepare(each, "hexahedron").typical_modulus(each, "hexahedron") for each in (one, other, one)]
+    element = plain_element("hexahedron")
+    first = [prepare(each, "hexahedron").typical_modulus(each, element) for each in (one, other, one)]
     assert checked == [one, other]
     assert first == pytest.approx([first[0], first[0] * 321 / 123, first[0]], rel=1e-12)
     for _ in range(2):
@@ -353,7 +355,8 @@ def test_the_typical_modulus_is_the_mean_diagonal_of_a_unit_cell(cell: str) -> N
     }[cell]
     material = PlaneStrain(7.0, 0.3) if dim == 2 else IsotropicElasticity(7.0, 0.3)
     expected = np.diag(element_stiffness(sides, cell, isotropic_matrix(7.0, 0.3, dim))).mean()
-    assert prepare(material, cell).typical_modulus(material, cell) == pytest.approx(expected, rel=1e-12)
+    found = prepare(material, cell).typical_modulus(material, plain_element(cell))
+    assert found == pytest.approx(expected, rel=1e-12)
     assert expected == pytest.approx(np.diag(by_node(one_cell(material, cell, sides))).mean(), rel=1e-12)
 
 

@@ -57,7 +57,7 @@ MUTATIONS = (
     ),
     Mutation(
         "mortar integrals do not go around the axis",
-        "_kinematics/revolved_measure.py",
+        "_kinematics/revolution.py",
         '2 * np.pi * weight * np.einsum("nqk,nk->nq", functions, first)',
         "weight",
         ("tests/fem/test_axisymmetric.py::test_pressure_is_transmitted_exactly_by_mortar",),
@@ -65,7 +65,7 @@ MUTATIONS = (
     Mutation(
         "changes of volume leave out the way around the axis",
         "_kinematics/revolution.py",
-        "np.asarray(self.around(radii) * jacobians(points, cells, positions))",
+        "np.asarray(self.measure.around(radii) * jacobians(points, cells, positions))",
         "jacobians(points, cells, positions)",
         (
             "tests/large_deformations/test_axisymmetric.py"
