@@ -375,7 +375,7 @@ class RigidStart:
         self._bodies = [
             slice(int(offset[number]), int(offset[number + 1]))
             for number, body in enumerate(bodies)
-            if body.deforms_much and not body.axisymmetric
+            if body.deforms_much and body.kinematics.can_rotate
         ]
 
     def moved(self, before: np.ndarray, load: Loading, displacement: Vector) -> Vector | None:

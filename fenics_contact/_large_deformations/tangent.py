@@ -28,7 +28,6 @@ from fenics_contact.feti.inverse import FactoredOperator, LocalKind, TornInverse
 from fenics_contact.feti.kernel_basis import TornModes
 from fenics_contact.feti.subdomain import CachedMatrix, LocalOperator, Subdomain
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.qp.coarse import CoarseSpace
 
 
@@ -443,8 +442,7 @@ def linearised(
         part = slice(start, start + subdomain.mesh.size)
         points = subdomain.points + displacement[part].reshape(subdomain.points.shape)
         body = torn.scene.bodies[subdomain.mesh.body]
-        modes = body.rigid_modes(points) if body.axisymmetric else rigid_body_modes(points)
-        kernel = modes.reshape(subdomain.mesh.size, -1)
+        kernel = body.kinematics.rigid_modes(points).reshape(subdomain.mesh.size, -1)
         matrix = CachedMatrix(partial(_itself, tangent))
         subdomains.append(
             replace(subdomain, points=points, kernel=kernel, load=unbalanced[part], matrix=matrix)

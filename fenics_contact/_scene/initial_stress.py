@@ -27,12 +27,10 @@ def require_components(load: InitialStress, body: Body) -> None:
 
 def _check(stress: np.ndarray, name: str, body: Body) -> None:
     """Reject components that are not zero but have no place in a body; `stress`: (n, 6)."""
-    if body.mesh.dim == 3 or body.torsion:
-        return
-    without = {"yz": 3, "xz": 4}
-    if not all(body.axisymmetric or isinstance(each, Transverse) for each in body.materials):
-        without["zz"] = 2
-    given = [word for word, place in without.items() if stress[:, place].any()]
+    places = {"zz": 2, "yz": 3, "xz": 4}
+    across = all(isinstance(each, Transverse) for each in body.materials)
+    without = [word for word in body.kinematics.zero_stress if not (across and word == "zz")]
+    given = [word for word in without if stress[:, places[word]].any()]
     if given:
         raise InvalidInputError(
             f"the InitialStress of body {name!r} must be zero in {' and '.join(without)}, which it does not "

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector, check_row, checked, floats, naming_arguments, unit_vector
+from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.fields import (
     ScalarValue,
     Ufl,
@@ -339,11 +340,10 @@ class Spinning:
     axis: GivenVector | None
     components: int = 0
 
-    def require_axis(self, dim: int, axisymmetric: bool) -> None:
-        """Reject an axis in another space than the body, and one that a body of revolution does not have."""
-        own = self.axis in ((0.0, 1.0), (0.0, -1.0)) and self.point[0] == 0.0
-        if len(self.point) != dim or (axisymmetric and not own):
-            needed = f"{dim} coordinates" if not axisymmetric else "point (0, 0) and axis (0, 1)"
+    def require_axis(self, kinematics: Kinematics) -> None:
+        """Reject an axis that a body does not have."""
+        if not kinematics.has_axis(self.point, self.axis):
+            needed = kinematics.axis_in_words
             raise InvalidInputError(
                 f"the axis of a centrifugal force must be that of the body, with {needed}, got point "
                 f"{self.point!r} and axis {self.axis!r}: give these"

@@ -201,11 +201,8 @@ def whole_force(
 
     `node`: of the slave, in the middle of the contact; `force`: that of the scene, [force].
     """
-    mirrored = slave.mirrored[node]
-    if scene.axisymmetric:
-        return force, 0.0 if mirrored.any() else float(slave.points[node, 0])
-    # Each plane of symmetry through the contact halves the force.
-    return force * 2.0 ** np.count_nonzero(mirrored), None
+    planes = int(np.count_nonzero(slave.mirrored[node]))
+    return scene.kinematics.whole_force(force, slave.points[node], planes)
 
 
 def _relative_curvatures(

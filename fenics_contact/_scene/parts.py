@@ -97,14 +97,13 @@ class SceneParts:
         for part in (*self.supports, *self.loads):
             if not isinstance(part, RigidSurface | Roller | ToolMotion):
                 self._require_components(part)
-            if self.axisymmetric:
-                self._require_off_axis(part)
+            self._require_off_axis(part)
             if isinstance(part, TotalForce):
                 self._require_lever(part)
             if isinstance(part, BodyForce | InitialStress):
                 require_region(part, self.bodies[part.body].mesh)
             if isinstance(part, BodyForce) and isinstance(part.value, Spinning):
-                part.value.require_axis(self.dim, self.axisymmetric)
+                part.value.require_axis(self.kinematics)
             if isinstance(part, InitialStress):
                 require_components(part, self.bodies[part.body])
             if isinstance(part, ThermalStrain):
@@ -208,14 +207,11 @@ class SceneParts:
         """Reject a vector whose dimension is not that of its body."""
         if isinstance(part, InitialStress):
             return
-        dim = self.bodies[part.body].components
-        if self.torsion and isinstance(part, TotalForce):
-            dim = 2  # forces around the axis balance each other, their moment is given in their place
+        of = self.bodies[part.body].kinematics
+        dim, needed = of.components, of.vector_in_words
+        if isinstance(part, TotalForce):
+            dim, needed = of.resultant_components, of.resultant_in_words
         if isinstance(part.value, tuple) and len(part.value) != dim:
-            needed = "two entries, for x and y, as the body is plane" if dim == 2 else "three, for x, y and z"
-            needed = "three, for r, z and the way around, as the body may twist" if self.torsion else needed
-            if self.torsion and dim == 2:
-                needed = "two entries, for r and z; a torque is its moment"
             raise InvalidInputError(
                 f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
                 f"give {dim} of them"
@@ -231,9 +227,7 @@ class SceneParts:
                 f"a load on a surface needs an area, {where} is a line, the axis of revolution: choose "
                 "another surface"
             )
-        if self.torsion and isinstance(part, TotalForce) and part.at is None:
-            return
-        if isinstance(part, TotalForce) and (part.moment is not None or part.at is not None):
+        if isinstance(part, TotalForce) and not body.kinematics.has_moment(part.moment, part.at):
             raise InvalidInputError(
                 f"TotalForce on {where} of a body of revolution acts along its axis, and outwards all "
                 f"around, got moment {part.moment!r} and at {part.at!r}: leave both out"
@@ -299,7 +293,7 @@ class SceneParts:
 
     def _require_sector(self, sector: CyclicSymmetry) -> None:
         """Reject an axis in another space, and sides that are no part of a turn apart."""
-        if len(sector.at) != self.dim or self.axisymmetric:
+        if len(sector.at) != self.dim or not self.kinematics.can_rotate:
             raise InvalidInputError(
                 f"CyclicSymmetry.at of {sector.place} must have {self.dim} coordinates, and bodies of "
                 f"revolution have no sectors, got {sector.at!r}: give a point of the bodies' space"
@@ -547,9 +541,7 @@ def _plane(scene: SceneParts, support: AnySupport) -> np.ndarray | None:
     normal = flat_normal(mesh, support.surface)
     if normal is None or abs(direction_of(mesh, support) @ normal) < 1.0 - TILT:
         return None
-    if scene.axisymmetric and abs(normal[1]) < 1.0 - TILT:  # a cone
-        return None
-    return normal
+    return normal if scene.kinematics.is_mirrored(normal, TILT) else None
 
 
 def mirrored(scene: SceneParts, body: str) -> np.ndarray:

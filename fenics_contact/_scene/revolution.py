@@ -36,14 +36,12 @@ def require_all_or_none(bodies: Mapping[str, Body], deforming: Mapping[str, Body
 
 
 def hold_axis(body: Body, name: str, prescribed: np.ndarray) -> None:
-    """Prescribe that a body of revolution moves along its axis there; reject that supports say otherwise.
+    """Prescribe that a body moves along its axis there, if it has one; reject supports that prescribe more.
 
     `prescribed`: what supports prescribe, NaN where free, shape (n_nodes, components), changed in place.
     """
-    axis, names = body.on_axis, {0: "radial displacement"}
-    if body.torsion:
-        names[2] = "displacement around"
-    for component, what in names.items():
+    axis = body.on_axis
+    for component, what in body.kinematics.held_on_axis.items():
         moved = np.abs(np.nan_to_num(prescribed[axis, component])).max(initial=0.0)
         if moved > 0.0:
             raise InvalidInputError(

@@ -234,10 +234,9 @@ def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalA
                 "component free (None) in one of them"
             )
         prescribed[nodes] = np.where(np.isnan(given), known, given)
-    if scene.axisymmetric:
-        for name in tearing.body_names:
-            first = tearing.first_of(name)
-            hold_axis(scene.bodies[name], name, prescribed[first : first + scene.bodies[name].mesh.n_nodes])
+    for name in tearing.body_names:
+        first = tearing.first_of(name)
+        hold_axis(scene.bodies[name], name, prescribed[first : first + scene.bodies[name].mesh.n_nodes])
     parts = []
     for body in scene.rolling_bodies:
         first = tearing.first_of(body)

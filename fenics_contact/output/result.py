@@ -64,8 +64,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
     """
     return {
         "dimension": scene.dim,
-        **({"axisymmetric": True} if scene.axisymmetric else {}),
-        **({"torsion": True} if scene.torsion else {}),
+        **scene.kinematics.record,
         "bodies": {name: _body(body, subdomains[name]) for name, body in scene.deforming.items()},
         "supports": readable(scene.supports),
         "loads": readable(scene.loads),

@@ -296,7 +296,7 @@ def _tools(state: State, balance: Balance) -> dict[str, float]:
     columns: dict[str, float] = {}
     for name, tool in state.tools().items():
         acting = Resultant(tool.force, tool.moment, tool.displacement)
-        axes = "rz" if acting.axisymmetric else "xyz"[: len(tool.force)]
+        axes = [head[1] for head in acting.heads[: len(tool.force)]]
         turns = np.atleast_1d(tool.rotation)[: np.size(tool.moment)]
         around = "xyz"[3 - len(turns) :]
         columns |= {f"tool {name} u{axis}": float(x) for axis, x in zip(axes, tool.displacement, strict=True)}

@@ -86,7 +86,8 @@ if TYPE_CHECKING:
 
 def axes_of(scene: Scene) -> tuple[str, str]:
     """Return the names of the coordinates of plane bodies."""
-    return ("r", "z") if scene.axisymmetric else ("x", "y")
+    first, second, *_ = scene.kinematics.axes
+    return first, second
 
 
 @naming_arguments

@@ -67,7 +67,7 @@ def stick_area(state: State, pair: int | str = 0) -> float:
 
 def _area(state: State, surface: _SlaveSurface) -> float:
     """Return the area within the rim."""
-    total, facing = 0.0, np.where(surface.given, 0.0, surface.facing)
+    measure, total, facing = state.scene.kinematics.measure, 0.0, np.where(surface.given, 0.0, surface.facing)
     for corners, weight in _simplices(surface.facets.shape[1]):
         facets = surface.facets[:, corners]
         edges = surface.places[facets[:, 1:]] - surface.places[facets[:, :1]]
@@ -75,8 +75,7 @@ def _area(state: State, surface: _SlaveSurface) -> float:
         size = np.sqrt(np.maximum(gram, 0.0)) / (len(corners) - 1)
         share = surface.closed_share(facets)
         size = size * facing[facets].mean(axis=1)
-        if state.scene.axisymmetric:
-            size = size * _circumference(surface.places[facets, 0], surface.closed[facets], share)
+        size = size * measure.around_closed(surface.places[facets, 0], surface.closed[facets], share)
         total += weight * float(size @ share)
     return total
 
@@ -220,12 +219,6 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
         facing = np.clip(scene.kinematics.measure.filled(whole, facing, on_axis), 0.0, 1.0)
     facets, beyond = surface.facets[:, : surface.corners], 0.0 if by_mortar else 0.5
     return _SlaveSurface(places, facets, pressure, spread, facing, given, beyond)
-
-
-def _circumference(radii: np.ndarray, closed: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return that of the middle of the closed share of edges, by radii and marks of their ends, (n, 2)."""
-    near, far = np.where(closed[:, :1], radii, radii[:, ::-1]).T
-    return np.asarray(2 * np.pi * (near + share / 2 * (far - near)))
 
 
 def _modulus(state: State, pair: int) -> float:

@@ -151,9 +151,7 @@ class DeformedState(State):
         )
 
     def _exerted(self, force: np.ndarray, moment: np.ndarray, about: np.ndarray) -> Resultant:
-        if self.scene.axisymmetric:
-            return Resultant(force, np.zeros(0), about)
-        return Resultant(force, float(moment[0]) if len(moment) == 1 else moment, about)
+        return Resultant(force, self.scene.kinematics.moment_at(force, moment, about, about), about)
 
     @property
     def _known_motions(self) -> Mapping[tuple[str, str], np.ndarray]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -397,25 +398,19 @@ def put_history_stress(
 
 def _means(body: Body, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return means over cells of values at Gauss points, (n_cells, n_gauss, ...) to (n_cells, ...)."""
-    weights, first = _gauss_weights(body, cells)
-    weights = weights * body.kinematics.measure.around(first)
+    weights, places = _gauss_points(body, cells)
+    weights = weights * body.kinematics.measure.around(places[..., 0])
     weights = weights / weights.sum(axis=1, keepdims=True)
     return np.einsum("cq,cq...->c...", weights, values)
 
 
-def _gauss_weights(body: Body, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return weights of the Gauss points in the plane or in space, and their first coordinates."""
+def _gauss_points(body: Body, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return weights of the Gauss points of cells in coordinates, (n_cells, n_gauss), and their places."""
     mesh, cell = body.mesh, CELL_TYPES[body.mesh.cell_type]
     positions, weights = quadrature(cell, quadrature_degree(body.element))
-    first = places_of(mesh.points, mesh.cells[cells])[..., 0] @ shape_values(cell, positions).T
-    return weights * jacobians(mesh.points, mesh.cells[cells], positions), first
-
-
-def _gauss_heights(body: Body, cells: np.ndarray) -> np.ndarray:
-    """Return the second coordinates of the Gauss points of cells, shape (n_cells, n_gauss)."""
-    mesh, cell = body.mesh, CELL_TYPES[body.mesh.cell_type]
-    positions, _ = quadrature(cell, quadrature_degree(body.element))
-    return np.asarray(places_of(mesh.points, mesh.cells[cells])[..., 1] @ shape_values(cell, positions).T)
+    corners, values = places_of(mesh.points, mesh.cells[cells]), shape_values(cell, positions)
+    places = np.stack([corners[..., axis] @ values.T for axis in range(mesh.dim)], axis=-1)
+    return weights * jacobians(mesh.points, mesh.cells[cells], positions), places
 
 
 def nodal_stress(
@@ -476,36 +471,22 @@ def _at_sites(
     temperature = temperature_of(torn.scene.loads, name)
     means = CellStress(mesh, body, torn.decomposition.comm, temperature)
     number = cells_of_body(mesh, body.mesh.apart[0])
-    places = body.mesh.points - (0.0 if body.axisymmetric else body.mesh.points.mean(axis=0))
-    # A rotation has no stress: the gradients (i, j) and (j, i) have the same. Of bodies of revolution u_z = r
-    # is shear alone, u_r = z has a hoop strain.
+    kinematics = body.kinematics
+    places = kinematics.from_origin(body.mesh.points)
+    # A rotation has no stress: the gradients (i, j) and (j, i) have the same.
     pairs = [(i, j) for i in range(dim) for j in range(i, dim)]
     units = np.zeros((1 + len(pairs), dim, dim))
     units[np.arange(1, len(units)), [j for _, j in pairs], [i for i, _ in pairs]] = 1.0
     fields = [np.pad(places @ unit.T, ((0, 0), (0, width - dim))) for unit in units]
     sizes = [gradients[:, i, j] + (gradients[:, j, i] if i != j else 0.0) for i, j in pairs]
-    if body.axisymmetric:
-        # u = (r, 0) has the hoop strain of its radial one; (1, 0) has 1 / r, and no other.
-        fields.append(np.broadcast_to(np.eye(width)[0], (len(places), width)))
-        sizes.append(_by_radius(torn, sites, displacement, sizes[0], 0) - sizes[0])
-    if body.torsion:
-        # u_θ = 1 has the shear −1 / r, and u_θ = z the shear 1 of z and −z / r.
-        fields += [np.eye(width)[2] * np.ones((len(places), 1)), np.eye(width)[2] * places[:, 1:]]
-        turn = _by_radius(torn, sites, displacement, gradients[:, 2, 0], 2)
-        sizes += [gradients[:, 2, 0] - turn, gradients[:, 2, 1]]
+    fields += kinematics.further_fields(places)
+    sizes += kinematics.further_strains(gradients, partial(_by_radius, torn, sites, displacement))
     on_cells = [
         means.components(displacement_function(mesh, body.mesh.at_nodes_apart(field))) for field in fields
     ]
-    if body.axisymmetric:
-        weights, radii = _gauss_weights(body, number)
-        mean = ((weights * radii).sum(axis=1) / weights.sum(axis=1))[:, None]
-        hoop = 1 + len(pairs)
-        on_cells[hoop] = on_cells[0] + mean * (on_cells[hoop] - on_cells[0])
-    if body.torsion:
-        on_cells[-2] = on_cells[0] - mean * (on_cells[-2] - on_cells[0])
-        heights = _gauss_heights(body, number)
-        along = ((weights * heights).sum(axis=1) / (weights * radii).sum(axis=1))[:, None]
-        on_cells[-1] = on_cells[-1] + along * (on_cells[-2] - on_cells[0])
+    rest, further = on_cells[0], on_cells[1 + len(pairs) :]
+    gauss_points = partial(_gauss_points, body, number)
+    on_cells[1 + len(pairs) :] = kinematics.of_unit_strains(rest, further, gauss_points)
     around = _around_sites(torn, name, sites, np.hstack(on_cells), number)
     at_rest, *strained = np.split(around, len(fields), axis=1)
     total = at_rest.copy()

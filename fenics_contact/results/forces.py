@@ -10,13 +10,14 @@ import numpy as np
 from fenics_contact._base.checks import GivenVector, unit_vector
 from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._kinematics.base import Kinematics, moment_of
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface, named
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
-from fenics_contact._scene.supports import RigidSurface, Roller, Support, TurningSurface
+from fenics_contact._scene.supports import RigidSurface, Roller, Support
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import share_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
@@ -58,14 +59,11 @@ class NodalForces:
     moved: Mapping[tuple[str, str], np.ndarray] = field(default_factory=dict)
     springs: Mapping[tuple[str, str], Resultant] = field(default_factory=dict)
 
-    def point_load(self, support: RigidSurface, about: np.ndarray, axisymmetric: bool = False) -> Resultant:
+    def point_load(self, support: RigidSurface, about: np.ndarray, kinematics: Kinematics) -> Resultant:
         """Return the load at the point of a rigid surface, about another point."""
         force, moment = np.split(support.load, [support.dim])
-        if axisymmetric:
-            return Resultant(force, moment if isinstance(support, TurningSurface) else np.zeros(0), about)
         point = np.array(support.at) + self.moved.get((support.body, support.surface), 0.0)
-        load = Resultant(force, float(moment[0]) if support.dim == 2 else moment, point)
-        return Resultant(force, load.moment_about(about), about)
+        return Resultant(force, kinematics.moment_at(force, moment, point, about), about)
 
     def spring(self, support: RigidSurface, about: np.ndarray) -> Resultant | None:
         """Return what the springs of a tool exert, about another point; None without any."""
@@ -321,28 +319,11 @@ def resultant(
     forces: np.ndarray,
     places: np.ndarray,
     about: np.ndarray,
+    kinematics: Kinematics,
     surface: Surface | None = None,
-    axisymmetric: bool = False,
 ) -> Resultant:
-    """Return force and moment of forces that act at places, both of shape (n, dim), about a point, (dim,).
-
-    Forces all around an axis have no moment, with torsion one about the axis.
-    """
-    if axisymmetric and forces.shape[1] == 3:
-        torque = np.atleast_1d(places[:, 0] @ forces[:, 2])
-        return Resultant(forces[:, :2].sum(axis=0), torque, about, surface)
-    if axisymmetric:
-        return Resultant(forces.sum(axis=0), np.zeros(0), about, surface)
-    moment = moment_of(forces, places - about)
-    total = float(moment.sum()) if forces.shape[1] == 2 else moment.sum(axis=0)
-    return Resultant(forces.sum(axis=0), total, about, surface)
-
-
-def moment_of(force: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """Return arm × force, shape (..., 3), in the plane the number x·Fy − y·Fx, shape (...,)."""
-    if force.shape[-1] == 2:
-        return np.asarray(arm[..., 0] * force[..., 1] - arm[..., 1] * force[..., 0])
-    return np.cross(arm, force)
+    """Return force and moment of forces that act at places, both of shape (n, dim), about a point, (dim,)."""
+    return Resultant(*kinematics.resultant(forces, places, about), about, surface)
 
 
 def point_of(given: GivenVector | np.ndarray, dim: int) -> np.ndarray:
@@ -378,11 +359,11 @@ def support_reactions(
         surface = Surface(support.body, support.surface)
         own = np.array(support.at) if isinstance(support, RigidSurface) else centroid(scene, surface)
         point = own if about is None else point_of(about, scene.dim)
-        total = resultant(share.of(forces.reaction), forces.places, point, surface, scene.axisymmetric)
+        total = resultant(share.of(forces.reaction), forces.places, point, scene.kinematics, surface)
         if isinstance(support, RigidSurface):
             if (spring := forces.spring(support, point)) is not None:
                 total = total - spring
-            total = total - forces.point_load(support, point, scene.axisymmetric)
+            total = total - forces.point_load(support, point, scene.kinematics)
             if support.body in _uncarried(torn):
                 total = on_tool(torn, forces, support.body, point)
                 total = Resultant(-total.force, -total.moment, point, surface)
@@ -402,12 +383,11 @@ def on_tool(torn: TornSystem, forces: NodalForces, tool: str, about: np.ndarray)
     """Return the resultant of the contact on a rigid tool, about a point."""
     pairs = [k for k, pair in enumerate(torn.scene.contacts) if getattr(pair.master, "name", None) == tool]
     mine = np.flatnonzero(np.isin(torn.points.pair, pairs))
-    places, turned = torn.points.own[mine] @ forces.places, torn.scene.axisymmetric
+    places, kinematics = torn.points.own[mine] @ forces.places, torn.scene.kinematics
     master = torn.points.master[mine]
     carried = np.diff(master.indptr) > 0  # where the tool is, also where surfaces that give way keep apart
     places = np.where(carried[:, None], master @ forces.places, places)
-    acting = -forces.contact[mine] * ([0.0, 1.0] if turned else 1.0)  # radial ones balance each other
-    return resultant(acting, places, about, None, turned)
+    return resultant(-forces.contact[mine] * kinematics.balanced, places, about, kinematics)
 
 
 def foundation_forces(
@@ -418,7 +398,7 @@ def foundation_forces(
     for foundation, force in zip(scene.foundations, forces.foundations, strict=True):
         surface = Surface(foundation.body, foundation.surface)
         point = centroid(scene, surface) if about is None else point_of(about, scene.dim)
-        entries.append(resultant(force, forces.places, point, surface, scene.axisymmetric))
+        entries.append(resultant(force, forces.places, point, scene.kinematics, surface))
     return Resultants("foundation", tuple(entries), tuple(each.place for each in scene.foundations))
 
 
@@ -569,23 +549,20 @@ def force_balance(
         carriers = [isinstance(body, ToolBody) for body in torn.scene.bodies.values()]
         of_tool = np.repeat(carriers, np.diff(torn.decomposition.tearing.node_offset))
     point = _middle(forces.places[~of_tool]) if about is None else point_of(about, torn.scene.dim)
-    parts, turned = _parts(torn, forces), torn.scene.axisymmetric
-    axial = [0.0, 1.0, 1.0][: torn.components]
-    acting = {name: force * axial for name, force in parts.items()} if turned else parts
+    parts, kinematics = _parts(torn, forces), torn.scene.kinematics
     resultants = {
-        name: resultant(force, forces.places, point, axisymmetric=turned) for name, force in acting.items()
+        name: resultant(force * kinematics.balanced, forces.places, point, kinematics)
+        for name, force in parts.items()
     }
     for support in torn.scene.supports:
         if isinstance(support, RigidSurface):  # the load at its point comes in through its nodes
-            load, spring = forces.point_load(support, point, turned), forces.spring(support, point)
+            load, spring = forces.point_load(support, point, kinematics), forces.spring(support, point)
             resultants["loads"] += load
             resultants["reactions"] -= load
             if spring is not None:
                 resultants["beds"] += spring
                 resultants["reactions"] -= spring
-    arms = forces.places - point
-    if torn.scene.torsion:
-        arms = forces.places[:, :1]  # from the axis
+    arms = kinematics.arms(forces.places, point)
     sizes = [np.linalg.norm(force, axis=1) for force in parts.values()]
     reach = np.linalg.norm(arms, axis=1)
     return Balance(
@@ -652,7 +629,7 @@ def pair_resultants(
             mine = np.flatnonzero(points.pair == number)
             point = centroid(scene, pair.slave) if about is None else point_of(about, scene.dim)
             places = points.own[mine] @ forces.places
-            found.append(resultant(force[mine], places, point, pair.slave, scene.axisymmetric))
+            found.append(resultant(force[mine], places, point, scene.kinematics, pair.slave))
         return Resultants(kind, tuple(found), tuple(pair.place for pair in pairs))
 
     tied = np.concatenate([forces.joints[each] for each in torn.tie_rows])

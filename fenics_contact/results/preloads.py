@@ -79,7 +79,7 @@ class Preloads(ByName[SectionForces]):
             for number, (name, preload, length) in enumerate(named):
                 mine = rows.points.pair == number
                 places, acting = forces.places[rows.points.slave[mine]], forces.joints[rows][mine]
-                total = resultant(acting, places, places.mean(axis=0), axisymmetric=scene.axisymmetric)
+                total = resultant(acting, places, places.mean(axis=0), scene.kinematics)
                 normal = preload.normal(scene.bodies[preload.body].mesh)
                 found[name] = SectionForces(float(length), normal, total)
         return cls(found)
