@@ -31,7 +31,7 @@ def as_written(
     parameters = list(found.parameters.values())
     if inspect.isfunction(obj) and parameters and parameters[0].name == "self":
         parameters = parameters[1:]
-    parameters = [made_anew(parameter) for parameter in parameters]
+    parameters = [shown(parameter) for parameter in parameters]
     text = stringify_signature(found.replace(parameters=parameters), show_return_annotation=False)
     result = found.return_annotation
     plain_result = plain(result) if isinstance(result, str) and not inspect.isclass(obj) else None
@@ -39,15 +39,17 @@ def as_written(
 
 
 class Ellipses:
-    """A default value that is made anew for every call."""
+    """A default value that no line shows."""
 
     def __repr__(self) -> str:
         return "..."
 
 
-def made_anew(parameter: inspect.Parameter) -> inspect.Parameter:
-    """Write three dots for the factory of a dataclass's field."""
-    return parameter.replace(default=Ellipses()) if repr(parameter.default) == "<factory>" else parameter
+def shown(parameter: inspect.Parameter) -> inspect.Parameter:
+    """Write three dots for the factory of a dataclass's field, and for a default that needs several lines."""
+    default = repr(parameter.default)
+    hidden = default == "<factory>" or "\n" in default
+    return parameter.replace(default=Ellipses()) if hidden else parameter
 
 
 def annotations(obj: Any) -> dict[str, str]:

@@ -52,6 +52,13 @@ def test_signatures_are_those_of_the_source() -> None:
     assert written(Values.of) == ("(name: str = 'all', *, strict: bool = False)", "np.ndarray | None")
 
 
+def test_a_default_of_several_lines_is_three_dots() -> None:
+    def cut(mesh: str, table: object = np.array([[1], [2]])) -> None: ...
+
+    assert "\n" in repr(np.array([[1], [2]]))
+    assert written(cut) == ("(mesh: str, table: object = ...)", "None")
+
+
 def test_nobody_calls_an_enumeration() -> None:
     assert written(Colour) == ("", None)
 
