@@ -1,4 +1,7 @@
-"""Tiny scenes with everything in them: nodes that stick, nodes that slip, nodes that lift off."""
+"""Tiny scenes with everything in them: nodes that stick, nodes that slip, nodes that lift off.
+
+Types of what scenes are made of are imported from here: they have no public names.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +23,9 @@ from fenics_contact import (
     Tresca,
     box_partition,
 )
+from fenics_contact._scene.loads import Load as Load
+from fenics_contact._scene.obstacles import RigidObstacle as RigidObstacle
+from fenics_contact._scene.supports import AnySupport as AnySupport
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 

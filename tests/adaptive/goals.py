@@ -26,12 +26,12 @@ from fenics_contact import (
     goal_error,
     solve_scene,
 )
-from fenics_contact._scene.loads import Load
 from fenics_contact.design import ContactForces, LargestPressure, StrainEnergy
 from fenics_contact.gallery import block, box_lattice, half_disc, rectangle, rectangle_lattice
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import bisection_partition
 from fenics_contact.results import ContactResult
+from tests.scenes import Load
 
 RUBBER = PlaneStrain(1000.0, 0.3)
 FLOOR = RigidPlane((0.0, 0.0), (0.0, 1.0))

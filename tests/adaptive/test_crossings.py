@@ -27,10 +27,10 @@ from fenics_contact._adaptive.crossings import (
     refined_at_crossings,
 )
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
-from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import block, rectangle, rectangle_lattice
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
+from tests.scenes import AnySupport
 from tools.random_scenes.corners import graded
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import _cli as cli
 from fenics_contact import read_scene_file
+from fenics_contact.__main__ import main
 from fenics_contact.decks import read_deck, write_scene_file
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
@@ -107,12 +107,12 @@ def test_a_scene_file_has_the_answer_of_its_deck(name: str, tmp_path: Path) -> N
 
 def test_the_command_line_writes_a_scene_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = deck(tmp_path, DECKS["a tie"])
-    assert cli.main(MPI.COMM_SELF, ["convert", str(path)]) == 0
+    assert main(["convert", str(path)]) == 0
     assert "model.inp as a scene file in" in capsys.readouterr().out
     assert (tmp_path / "model.toml").read_text().startswith("# Written from model.inp\n")
     text = (tmp_path / "model_mesh.inp").read_text()
     assert "*SURFACE, NAME=FEET, TYPE=ELEMENT" in text
-    assert cli.main(MPI.COMM_SELF, ["run", str(tmp_path / "model.toml"), "--plan"]) == 0
+    assert main(["run", str(tmp_path / "model.toml"), "--plan"]) == 0
 
 
 def test_a_deck_without_steps_is_the_scene_before_them(tmp_path: Path) -> None:

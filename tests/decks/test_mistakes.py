@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from mpi4py import MPI
 
-from fenics_contact import _cli as cli
+from fenics_contact.__main__ import main
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
@@ -225,7 +224,7 @@ def test_the_command_line_runs_a_deck(tmp_path: Path, capsys: pytest.CaptureFixt
     path, output = deck(tmp_path, "*HEADING\na bar\n*CONTROLS\n1\n" + GOOD), tmp_path / "there"
 
     def run(*more: str) -> int:
-        return cli.main(MPI.COMM_SELF, ["run", str(path), "-o", str(output), "--no-pictures", *more])
+        return main(["run", str(path), "-o", str(output), "--no-pictures", *more])
 
     assert run("--plan") == 0
     printed = capsys.readouterr().out
@@ -248,7 +247,7 @@ def test_all_that_is_not_known_is_named_at_once(tmp_path: Path, capsys: pytest.C
     more += "*FANCY\n*FANCY\n"
     text = GOOD.replace("*STEP\n", more + "*STEP\n").replace("*CLOAD\n", "*CLOAD, LOAD CASE=2\n")
     path = deck(tmp_path, text)
-    assert cli.main(MPI.COMM_SELF, ["run", str(path), "--plan"]) == 2
+    assert main(["run", str(path), "--plan"]) == 2
     words = capsys.readouterr().err
     lines = path.read_text().splitlines()
     first = 1 + lines.index("*ELEMENT, TYPE=S4")

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Kept, Support
-from fenics_contact import _cli as cli
+from fenics_contact.__main__ import main
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block
 from tests.decks.texts import BAR, FREE_TO_CONTRACT, SECTION, STEEL, deck, mesh_cards, step
@@ -115,12 +115,12 @@ def test_the_command_line_takes_the_static_steps_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = deck(tmp_path, BAR + FREE_TO_CONTRACT + step("*CLOAD\nBAR_X1, 1, 5.\n") + OTHERS)
-    assert cli.main(MPI.COMM_SELF, ["run", str(path), "--plan"]) == 2
-    assert cli.main(MPI.COMM_SELF, ["run", str(path), "--plan", "--statics-only"]) == 0
+    assert main(["run", str(path), "--plan"]) == 2
+    assert main(["run", str(path), "--plan", "--statics-only"]) == 0
     assert "are left out: they are no statics" in " ".join(capsys.readouterr().out.split())
-    assert cli.main(MPI.COMM_SELF, ["convert", str(path), "--statics-only"]) == 0
+    assert main(["convert", str(path), "--statics-only"]) == 0
     scene = str(path.with_suffix(".toml"))
-    assert cli.main(MPI.COMM_SELF, ["run", scene, "--plan", "--statics-only"]) == 2
+    assert main(["run", scene, "--plan", "--statics-only"]) == 2
     assert "--statics-only is of decks, got the scene file" in " ".join(capsys.readouterr().err.split())
 
 

@@ -22,7 +22,6 @@ from fenics_contact import (
     Tresca,
     box_partition,
 )
-from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.design import TotalPotential
 from fenics_contact.gallery import LinkShape, TwoLinks, two_links
 from fenics_contact.gallery.links import PULL_AXIS
@@ -55,7 +54,7 @@ def crossed_links() -> TwoLinks:
     return TwoLinks(links.first, tilted)
 
 
-def chain(friction: Friction, geometry: Geometry = "best", pull: float = PULL) -> Scene:
+def chain(friction: Friction, geometry: str = "best", pull: float = PULL) -> Scene:
     """Link 1 is held at its far crown, link 2 pulled at its own; without friction a guide steadies it."""
     links = crossed_links()
     guide = [] if friction else [Support("link2", "grip", (None, 0.0, 0.0))]
@@ -76,7 +75,7 @@ def chain_designs() -> tuple[SurfaceDesign, SurfaceDesign]:
 
 
 def chain_problem(
-    friction: Friction, comm: MPI.Comm = MPI.COMM_SELF, geometry: Geometry = "best", **more: Any
+    friction: Friction, comm: MPI.Comm = MPI.COMM_SELF, geometry: str = "best", **more: Any
 ) -> Remembering:
     scene = chain(friction, geometry)
     partitions = {name: box_partition(body.mesh, BOXES) for name, body in scene.bodies.items()}
@@ -96,7 +95,7 @@ REGIMES: dict[str, tuple[Friction, float]] = {
 
 
 @cache
-def line(regime: str, geometry: Geometry = "best") -> Line:
+def line(regime: str, geometry: str = "best") -> Line:
     """A line of designs without symmetry, on which every point keeps its status."""
     friction, step = REGIMES[regime]
     problem = chain_problem(friction, geometry=geometry)

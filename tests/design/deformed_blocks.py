@@ -20,11 +20,11 @@ from fenics_contact import (
     SurfaceDesign,
     box_partition,
 )
-from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact.design import Objective
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import NeoHooke
 from tests.design.quotients import Remembering
+from tests.scenes import RigidObstacle
 
 RUBBER, HARDER = NeoHooke(1.0, 0.3), NeoHooke(2.0, 0.3)
 

@@ -21,14 +21,13 @@ from fenics_contact import (
     SurfaceDesign,
     Traction,
 )
-from fenics_contact._scene.supports import AnySupport
 from fenics_contact.design import FrictionWork, LoadPath, Objective
 from tests.design.blocks import block_on_block, block_on_floor, designs_of
 from tests.design.chains import SOLVER
 from tests.design.mortar_lines import by_mortar
 from tests.design.plane_blocks import on_block, on_obstacle
 from tests.design.quotients import Way
-from tests.scenes import partitions
+from tests.scenes import AnySupport, partitions
 
 Steps = Sequence[tuple[str, tuple[float, ...]]]
 #: Loads on the top of plane blocks: pressed, pushed until some points slip, pulled back, half unloaded.

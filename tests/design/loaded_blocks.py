@@ -23,7 +23,6 @@ from fenics_contact import (
     Traction,
     Ufl,
 )
-from fenics_contact._scene.loads import Load
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
@@ -31,7 +30,7 @@ from tests.design.objectives import objectives
 from tests.design.plane_blocks import FLOOR as GROUND
 from tests.design.plane_blocks import line_of
 from tests.design.quotients import Line
-from tests.scenes import FLOOR, crowned
+from tests.scenes import FLOOR, Load, crowned
 
 
 def _mesh(cell: str, order: int) -> BodyMesh:

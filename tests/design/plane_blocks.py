@@ -24,7 +24,6 @@ from fenics_contact import (
     Traction,
     Tresca,
 )
-from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact.design import TotalPotential
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain, PlaneStress
@@ -33,7 +32,7 @@ from tests.design.aims import aims
 from tests.design.chains import SOLVER
 from tests.design.objectives import objectives
 from tests.design.quotients import Line, Remembering
-from tests.scenes import Friction, crowned, partitions
+from tests.scenes import Friction, RigidObstacle, crowned, partitions
 
 RUBBER, PLASTIC = PlaneStrain(100.0, 0.3), PlaneStress(300.0, 0.2)
 FLOOR = RigidPlane((0.0, 0.0), (0.0, 1.0))

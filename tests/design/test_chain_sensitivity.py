@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fenics_contact import Status
-from fenics_contact._surfaces.true_surface import Geometry
 from tests.design.chains import REGIMES, line
 from tests.design.objectives import objectives
 from tests.design.quotients import Line
@@ -64,7 +63,7 @@ def test_the_regimes_have_different_derivatives() -> None:
 @pytest.mark.parametrize("objective", ["energy", "stress", "normal forces"])
 @pytest.mark.parametrize("geometry", ["reconstructed", "faceted"])
 def test_derivatives_are_right_wherever_the_surface_between_nodes_comes_from(
-    geometry: Geometry, objective: str
+    geometry: str, objective: str
 ) -> None:
     here, known, judge = line("mixed", geometry), line("mixed"), OBJECTIVES[objective]
     assert here.is_smooth()

@@ -19,12 +19,11 @@ from fenics_contact import (
     Traction,
     Tresca,
 )
-from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact.gallery import block
 from tests.design.blocks import RUBBER, problem
 from tests.design.objectives import objectives
 from tests.design.quotients import Line, check_adjoint, check_statuses
-from tests.scenes import Friction, crowned
+from tests.scenes import Friction, RigidObstacle, crowned
 
 #: Many states: what claims rest on.
 pytestmark = [pytest.mark.slow, pytest.mark.claim]

@@ -19,9 +19,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact import BodyForce, BodyMesh, ContactPair, Coulomb, RigidPlane, Scene, TotalForce, Tresca
-from fenics_contact._scene.loads import Load
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.mesh.faces import vector_areas
+from tests.scenes import Load
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
 

@@ -33,7 +33,6 @@ from fenics_contact import (
     solve_scene,
     solve_steps,
 )
-from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, Material, PlaneStrain
@@ -52,6 +51,7 @@ from tests.equilibrium.press_fits import (
     press_fit,
     thick_press_fit,
 )
+from tests.scenes import RigidObstacle
 from tests.shapes.bodies import ball
 
 RUBBER = IsotropicElasticity(100.0, 0.3)

@@ -20,10 +20,10 @@ from fenics_contact import (
     Surface,
     TotalForce,
 )
-from fenics_contact._scene.loads import Load
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain
 from fenics_contact.mesh import bisection_partition
+from tests.scenes import Load
 
 FRICTION = 0.3
 

@@ -14,7 +14,6 @@ from mpi4py import MPI
 
 from fenics_contact import Body, RigidSurface, Scene, State, Support, Traction, box_partition, solve_scene
 from fenics_contact._equilibrium.linear import default_solver
-from fenics_contact._scene.loads import Load
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.gallery import block, rectangle
@@ -24,6 +23,7 @@ from fenics_contact.qp import FaceNewton, ProjectedCG, Smalse
 from tests.conftest import run_on_ranks
 from tests.fem.scenes import BOXES, TOLERANCE, cut, error, loaded_block, two_materials
 from tests.feti.scenes import CELLS, STEEL, clamped_block
+from tests.scenes import Load
 
 
 def cantilever(length: float, cells: int) -> Scene:

@@ -25,12 +25,11 @@ from fenics_contact import (
     gravity,
     solve_scene,
 )
-from fenics_contact._scene.loads import Load
-from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.results.deformed_state import AnyState
+from tests.scenes import AnySupport, Load
 
 SOFT = IsotropicElasticity(1000.0, 0.3)
 #: A point beside the end of the bar, and what acts there.

@@ -52,7 +52,6 @@ from fenics_contact._large_deformations.tangent import (
     with_inertia,
 )
 from fenics_contact._large_deformations.tangent_step import tangent_step
-from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -69,6 +68,7 @@ from tests.large_deformations.scenes import RUBBER as LIMIT_RUBBER
 from tests.large_deformations.scenes import cut, pressed, rounded, tilted
 from tests.large_deformations.scenes import cut as in_pieces
 from tests.materials.deformed import patch_of
+from tests.scenes import RigidObstacle
 
 RUBBER = NeoHooke(1.0, 0.4999, mean_dilatation=True)
 

@@ -8,9 +8,9 @@ from mpi4py import MPI
 from fenics_contact import Body, BodyMesh, Scene
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.loads import as_tractions
-from fenics_contact._scene.loads import Load
 from fenics_contact.feti.subdomain import Subdomain, assemble, cut_out
 from fenics_contact.materials import Material
+from tests.scenes import Load
 
 #: Reference coordinates of the vertices in VTK order.
 VERTICES = {

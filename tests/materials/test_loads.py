@@ -26,7 +26,6 @@ from fenics_contact import (
     gravity,
     solve_scene,
 )
-from fenics_contact._scene.loads import Load
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -42,6 +41,7 @@ from fenics_contact.materials import (
 from fenics_contact.mesh import quadratic
 from tests.materials.bodies import bent, box, in_halves, steel
 from tests.materials.elements import CELLS, PLANE, SPACE, load_by_node, whole
+from tests.scenes import Load
 
 
 def force(cell: str, *loads: Load, straight: bool = False) -> np.ndarray:

@@ -24,12 +24,12 @@ from fenics_contact import (
     solve_scene,
     solve_steps,
 )
-from fenics_contact._scene.loads import Load
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain, TemperatureDependentElasticity
 from tests.materials.bodies import bent, box
 from tests.materials.elements import CELLS, PLANE
+from tests.scenes import Load
 
 YOUNG = ((20.0, 200.0), (120.0, 100.0))
 POISSON = ((20.0, 0.3), (120.0, 0.2))

@@ -27,13 +27,13 @@ from fenics_contact import (
     box_partition,
     solve_scene,
 )
-from fenics_contact._scene.loads import Load
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import Material, OrthotropicPlaneStress, PlaneStrain, PlaneStress
 from fenics_contact.results.linear_state import as_linear
 from tests.materials.bodies import bent, in_halves
 from tests.materials.elements import PLANE, load_by_node, whole
+from tests.scenes import Load
 
 THIN, THICK = 0.5, 2.0
 

@@ -7,12 +7,12 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Body, Scene, Support, box_partition, centrifugal, gravity, solve_scene
-from fenics_contact._scene.loads import Load
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.mesh.quality import cell_volumes
 from tests.materials.bodies import bent, box, in_halves, steel
 from tests.materials.elements import CELLS, load_by_node, whole
+from tests.scenes import Load
 
 
 @pytest.mark.parametrize("cell", CELLS)

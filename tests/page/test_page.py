@@ -16,7 +16,7 @@ from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
 from fenics_contact import State, Status, result_page, write_result, write_vtu
-from fenics_contact import _cli as cli
+from fenics_contact.__main__ import main
 from fenics_contact._page.arrays import rounded
 from fenics_contact._page.obstacles import obstacle_entries
 from fenics_contact._page.page import Page, sections, status_words
@@ -360,7 +360,7 @@ def test_without_the_library_the_extra_is_named(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "plotly" else name)
     with pytest.raises(MissingRequirementError, match=r"web pages need plotly, found none: pip .*\[viz\]"):
         result_page(tmp_path / "state.vtm")
-    assert cli.main(MPI.COMM_SELF, ["view", str(tmp_path / "state.vtm"), "--page"]) == 5
+    assert main(["view", str(tmp_path / "state.vtm"), "--page"]) == 5
     assert not (tmp_path / "page.html").exists()
 
 
@@ -371,15 +371,15 @@ def test_the_command_writes_a_page_beside_the_result_or_where_told(
     write_vtu(plane_block(), tmp_path)
     write_result(plane_block(), tmp_path)
     words = [str(tmp_path), "--page"] if place == "after" else ["--page", str(tmp_path)]
-    assert cli.main(MPI.COMM_SELF, ["view", *words]) == 0
+    assert main(["view", *words]) == 0
     told = capsys.readouterr().out
     assert f"page in {tmp_path / 'page.html'}" in told
     assert "without a display" not in told
     data, _ = content((tmp_path / "page.html").read_text())
     assert data["title"] == tmp_path.name
-    assert cli.main(MPI.COMM_SELF, ["view", str(tmp_path), "--save", str(tmp_path / "b" / "mine.html")]) == 0
+    assert main(["view", str(tmp_path), "--save", str(tmp_path / "b" / "mine.html")]) == 0
     assert (tmp_path / "b" / "mine.html").exists()
-    assert cli.main(MPI.COMM_SELF, ["view", str(tmp_path), "--save", "mine.jpg"]) == 2
+    assert main(["view", str(tmp_path), "--save", "mine.jpg"]) == 2
 
 
 RANKS = """

@@ -31,7 +31,6 @@ from fenics_contact import (
     write_vtu,
 )
 from fenics_contact._surfaces.facets import filled_at_corners
-from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, half_cylinder, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
@@ -250,7 +249,7 @@ def test_forces_on_the_master_are_those_of_its_shape_functions(cell: str) -> Non
         assert len(contact.pressure) > 4
 
 
-def squeezed(cell: str, law: type, geometry: Geometry) -> np.ndarray:
+def squeezed(cell: str, law: type, geometry: str) -> np.ndarray:
     """Pressures between flat plates, three cells on two, of which hardly anything moves."""
     plane = cell in {"triangle", "quadrilateral"}
     build, flat = (rectangle, 1) if plane else (block, 2)

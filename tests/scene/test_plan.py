@@ -27,7 +27,6 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact._scene.plan import ConeKind, SolverKind
-from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.feti import DualSystem
 from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.gallery import block, half_cylinder, half_disc, hemisphere, rectangle
@@ -234,7 +233,7 @@ def test_the_plan_tells_by_how_much_facets_miss_a_ball(symmetry: Literal["xy", "
     ("geometry", "names"),
     [("reconstructed", "flat on reconstructed"), ("faceted", "facets on facets")],
 )
-def test_the_plan_names_the_geometry_that_was_asked_for(geometry: Geometry, names: str) -> None:
+def test_the_plan_names_the_geometry_that_was_asked_for(geometry: str, names: str) -> None:
     best, found = (ball("xy", geometry=each).plan().contacts[0].height for each in ("best", geometry))
     assert found == pytest.approx(best, rel=0.05)
     words = f"{names}; mortar, as the meshes do not match; facets miss it by up to"

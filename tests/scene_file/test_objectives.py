@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import _cli as cli
 from fenics_contact import read_scene_file
+from fenics_contact.__main__ import main
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact.design import (
@@ -256,7 +256,7 @@ upper = 0.02
 """
     path = tmp_path / "shifted.toml"
     path.write_text(STEPS + design)
-    cli.main(MPI.COMM_SELF, ["optimize", str(path), "-o", str(tmp_path), "--no-pictures"])
+    main(["optimize", str(path), "-o", str(tmp_path), "--no-pictures"])
     told = read_result(tmp_path)["optimisation"]
     assert told["objective"]["type"] == "LoadPath"
     assert "'shifted 2/2': FrictionWork" in told["objective"]["definition"]

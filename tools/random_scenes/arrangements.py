@@ -18,8 +18,7 @@ from fenics_contact import (
     Tie,
     Tresca,
 )
-from fenics_contact._scene.obstacles import RigidObstacle
-from tests.scenes import Friction
+from tests.scenes import Friction, RigidObstacle
 from tools.random_scenes.bodies import Grown, box, in_plane, round_body
 from tools.random_scenes.dice import Dice
 

@@ -30,11 +30,9 @@ from fenics_contact import (
     TotalForce,
     Traction,
 )
-from fenics_contact._scene.loads import Load
-from fenics_contact._scene.obstacles import RigidObstacle
-from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import rectangle
 from fenics_contact.mesh import bisection_partition
+from tests.scenes import AnySupport, Load, RigidObstacle
 from tools.random_scenes.deformed_parts import (
     any_material,
     friction_law,

@@ -30,10 +30,10 @@ from fenics_contact import (
     Traction,
     box_partition,
 )
-from fenics_contact._scene.loads import Load
 from fenics_contact.materials import OrthotropicElasticity, OrthotropicPlaneStress
 from fenics_contact.materials.elastic import can_expand
 from fenics_contact.mesh import bisection_partition
+from tests.scenes import Load
 from tools.hard_cases.transform import in_units
 from tools.random_scenes.arrangements import ARRANGEMENTS, Arrangement
 from tools.random_scenes.bodies import body, with_surface

@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact import BodyMesh, ContactPair, RigidCylinder, RigidPlane, RigidSphere, Surface
 from fenics_contact._pairing.points import ContactPoints
-from fenics_contact._scene.obstacles import RigidObstacle
+from tests.scenes import RigidObstacle
 from tools.random_scenes.whole import Whole, surface_area
 
 #: What rounding may do beside the coordinates, and beside the size of what lies about a point.

@@ -37,11 +37,9 @@ from fenics_contact import (
     TotalForce,
     Tresca,
 )
-from fenics_contact._scene.loads import Load
-from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from tests.scenes import Friction
+from tests.scenes import AnySupport, Friction, Load
 from tools.hard_cases.transform import renumbered_mesh, turned_mesh
 from tools.random_scenes.dice import Dice
 

@@ -17,8 +17,8 @@ from fenics_contact import (
     TotalForce,
     Traction,
 )
-from fenics_contact._scene.loads import Load
 from fenics_contact.materials import IsotropicElasticity, Material, OrthotropicElasticity
+from tests.scenes import Load
 from tools.hard_cases.transform import in_units
 from tools.random_scenes.arrangements import ARRANGEMENTS, Arrangement
 from tools.random_scenes.bodies import RATIOS, in_halves, in_plane

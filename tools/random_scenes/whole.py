@@ -16,7 +16,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact import Body, BodyForce, BodyMesh, Pressure, Scene, ThermalStrain, TotalForce
-from fenics_contact._scene.loads import Load
 from fenics_contact.materials import (
     IsotropicElasticity,
     OrthotropicElasticity,
@@ -27,6 +26,7 @@ from fenics_contact.materials import (
 )
 from fenics_contact.mesh import CellType
 from fenics_contact.mesh.cell_types import CELL_TYPES, FACET_TYPES, quadrature
+from tests.scenes import Load
 
 #: Components of a strain in the order of its vector, shear strains doubled.
 PAIRS = {2: [(0, 0), (1, 1), (0, 1)], 3: [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]}

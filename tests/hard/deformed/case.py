@@ -18,9 +18,9 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact._large_deformations.equations import Equations
-from fenics_contact._scene.supports import AnySupport
 from fenics_contact.feti import decompose
 from fenics_contact.mesh import bisection_partition
+from tests.scenes import AnySupport
 
 States = Sequence[DeformedState]
 TOLERANCE = 1e-9

@@ -18,11 +18,9 @@ from fenics_contact import (
     Surface,
     TotalForce,
 )
-from fenics_contact._scene.loads import Load
-from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from tests.scenes import Friction
+from tests.scenes import Friction, Load, RigidObstacle
 
 SOFT, STIFF = IsotropicElasticity(100.0, 0.3), IsotropicElasticity(300.0, 0.2)
 UP = (0.0, 0.0, 1.0)
