@@ -74,6 +74,7 @@ ifeq ($(strip $(ROOM)),)
 else
 	@$(if $(missing),echo "$(missing): no such folder; rooms are" $(notdir $(patsubst %/,%,$(wildcard tests/*/))) >&2; exit 2)
 	$(python) -m ruff check $(parts)
+	$(python) -m ruff format --check --quiet $(parts)
 	$(python) -m mypy $(parts)
 	$(quick) $(tested) $(rules)
 endif
