@@ -36,7 +36,7 @@ from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
 from fenics_contact.gallery.blocks import split_quadrilaterals
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import bisection_partition, quadratic
-from tests.fem.revolved import twisted_fit
+from tests.kinematics.revolved import twisted_fit
 
 STEEL, SOFT = PlaneStrain(2.1e5, 0.3), PlaneStrain(5e4, 0.2)
 

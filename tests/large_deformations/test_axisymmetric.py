@@ -34,7 +34,7 @@ from fenics_contact.gallery import rectangle
 from fenics_contact.materials import FinitePlasticity, HistoryMaterial, J2Plasticity, MooneyRivlin, NeoHooke
 from fenics_contact.materials.elastic import lame
 from fenics_contact.mesh import bisection_partition, quadratic
-from tests.fem.revolved import KINDS, Kind, section, squeezed_ring, stacked
+from tests.kinematics.revolved import KINDS, Kind, section, squeezed_ring, stacked
 
 RUBBER = NeoHooke(10.0, 0.3)
 
@@ -209,7 +209,7 @@ RANKS = """
     import numpy as np
     from mpi4py import MPI
     from fenics_contact import solve_scene
-    from tests.fem.revolved import squeezed_ring
+    from tests.kinematics.revolved import squeezed_ring
 
     comm, scene = MPI.COMM_WORLD, squeezed_ring()
     state = solve_scene(scene, comm, partitions=scene.partition(4), tolerance=1e-10)

@@ -25,21 +25,21 @@ MUTATIONS = (
         "_kinematics/revolution.py",
         "u[0] / x[0], self",
         "0 * u[0] / x[0], self",
-        ("tests/fem/test_axisymmetric.py::test_recovered_stress_of_a_patch_is_exact_on_the_axis",),
+        ("tests/kinematics/test_axisymmetric.py::test_recovered_stress_of_a_patch_is_exact_on_the_axis",),
     ),
     Mutation(
         "a turn about the axis strains bodies of revolution",
         "_kinematics/torsion.py",
         "-turn",
         "0",
-        ("tests/fem/test_torsion.py::test_stiffness_annihilates_translation_and_turn",),
+        ("tests/kinematics/test_torsion.py::test_stiffness_annihilates_translation_and_turn",),
     ),
     Mutation(
         "nothing rubs around the axis",
         "_pairing/torsion.py",
         "np.broadcast_to([0.0, 0.0, 1.0]",
         "np.broadcast_to([0.0, 0.0, 0.0]",
-        ("tests/fem/test_torsion.py::test_a_disc_turned_on_a_plate_has_the_torque_of_its_pressure",),
+        ("tests/kinematics/test_torsion.py::test_a_disc_turned_on_a_plate_has_the_torque_of_its_pressure",),
     ),
     Mutation(
         "quadratic slaves move in mortar contact as their nodes do",
@@ -60,7 +60,7 @@ MUTATIONS = (
         "_kinematics/revolution.py",
         '2 * np.pi * weight * np.einsum("nqk,nk->nq", functions, first)',
         "weight",
-        ("tests/fem/test_axisymmetric.py::test_pressure_is_transmitted_exactly_by_mortar",),
+        ("tests/kinematics/test_axisymmetric.py::test_pressure_is_transmitted_exactly_by_mortar",),
     ),
     Mutation(
         "changes of volume leave out the way around the axis",

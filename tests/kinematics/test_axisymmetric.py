@@ -48,7 +48,7 @@ from fenics_contact.output import read_result
 from fenics_contact.pictures import states
 from fenics_contact.pictures.drawing import ColouredField
 from fenics_contact.results.fields import tensors, von_mises_of
-from tests.fem.revolved import (
+from tests.kinematics.revolved import (
     BORE,
     KINDS,
     PRESSURE,
@@ -390,7 +390,7 @@ RANKS = """
     import numpy as np
     from mpi4py import MPI
     from fenics_contact import solve_scene
-    from tests.fem.revolved import pushed_with_friction
+    from tests.kinematics.revolved import pushed_with_friction
 
     comm, scene = MPI.COMM_WORLD, pushed_with_friction()
     state = solve_scene(scene, comm, partitions=scene.partition(4), tolerance=1e-12)

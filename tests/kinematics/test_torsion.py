@@ -53,7 +53,7 @@ from fenics_contact.output import read_result, write_contact_table
 from fenics_contact.pictures import plot_contact_pressure, plot_stress
 from fenics_contact.pictures.curves import contact_trace
 from fenics_contact.results.linear_state import as_linear
-from tests.fem.revolved import (
+from tests.kinematics.revolved import (
     BORE,
     INTERFERENCE,
     KINDS,
@@ -351,7 +351,7 @@ RANKS = """
     import numpy as np
     from mpi4py import MPI
     from fenics_contact import solve_scene
-    from tests.fem.revolved import twisted_fit
+    from tests.kinematics.revolved import twisted_fit
 
     comm, scene = MPI.COMM_WORLD, twisted_fit("quadrilateral", 6, "mortar", 1e-3)
     state = solve_scene(scene, comm, partitions=scene.partition(4), tolerance=1e-12)
