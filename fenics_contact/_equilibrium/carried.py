@@ -66,12 +66,13 @@ class CarriedState:
                 "transfers of a CarriedState must lead from the meshes of its state to those of the scene, "
                 f"got others, of {sorted(self.transfers)}: give the refinements with which both were made"
             )
-        kept = {
-            **{loop.name: True for loop in outer_loops(scene)},
+        others = {
             "contact of bodies that deform much": bool(scene.contacts) and scene.deforms_much,
             "preloads in scenes with nonlinear materials": bool(scene.preloads) and scene.is_nonlinear,
         }
-        what = [words for words, there in kept.items() if there]
+        what = [loop.name for loop in outer_loops(scene)] + [
+            words for words, there in others.items() if there
+        ]
         if what:
             raise InvalidInputError(
                 f"load steps on other meshes need histories that are carried there, that of {what[0]} is "

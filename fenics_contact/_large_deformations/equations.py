@@ -416,9 +416,10 @@ class Equations:
             responses = tuple(map(_on_bed, responses, self._beds, moved))
             external, softening = load.at(at.displacement)
             responses = tuple(map(_following, responses, self.decomposition.meshes))
-            follow = self.decomposition.following
-            external = follow.T @ external
-            softening = None if softening is None else (follow.T @ softening @ follow).tocsr()
+            external = self.decomposition.on_followed(external)
+            if softening is not None:
+                follow = self.decomposition.following
+                softening = (follow.T @ softening @ follow).tocsr()
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
         # What is no more than rounding of strains and of positions is none.

@@ -48,3 +48,8 @@ class Chosen:
         if self.choice.found != self.discretisation:
             return ""
         return f"{self.choice.found}, {self.choice.why}{EXCHANGED if self.choice.exchanged else ''}"
+
+    @property
+    def explained_discretisation(self) -> str:
+        """The discretisation and, where the scene chose it, why."""
+        return self.reason or self.discretisation

@@ -56,7 +56,7 @@ def in_words(pair: ContactPair | AnyTie) -> str:
     """Return the discretisation of a pair and, where the scene chose it, why."""
     if not isinstance(pair.master, Surface):
         return f"node, {RIGID}"
-    return pair.reason or pair.discretisation
+    return pair.explained_discretisation
 
 
 def _with_choice(scene: SceneParts, pair: Pair) -> Pair:

@@ -392,7 +392,7 @@ class Pairs(tuple[ContactPair, ...]):
         rows = [
             (
                 f"contact {number}", pair.place, in_short(pair.friction or "none"),
-                pair.reason or pair.discretisation,
+                pair.explained_discretisation,
             )
             for number, pair in enumerate(self)
         ]  # fmt: skip
@@ -439,7 +439,7 @@ def _in_words(value: float | OfPosition | str) -> str:
 def facts_of_pair(pair: ContactPair | Tie) -> dict[str, Any]:
     """Return what is given of a pair, and its discretisation with the reason of the scene's choice."""
     given = {each.name: getattr(pair, each.name) for each in fields(pair) if each.repr}
-    given["discretisation"] = pair.reason or pair.discretisation
+    given["discretisation"] = pair.explained_discretisation
     return {name: value for name, value in given.items() if value is not None and value is not False}
 
 

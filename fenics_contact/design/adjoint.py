@@ -286,8 +286,8 @@ def solve_adjoint(
     less accurate state saves most products. By default the multiplier of the state.
     """
     system = state.dual
-    follow = state.torn.decomposition.following
-    partials = replace(partials, by_displacement=follow.T @ partials.by_displacement)
+    followed = state.torn.decomposition.on_followed(partials.by_displacement)
+    partials = replace(partials, by_displacement=followed)
     _require_held(system, partials.by_displacement)
     problem, face, factor = _scaled(system.problem, linearised.face)
     task = Task("adjoint", unit="products")

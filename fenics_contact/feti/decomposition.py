@@ -420,6 +420,11 @@ class Decomposition:
         ends = self.tearing.components * self.block_offset
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
+    def on_followed(self, force: np.ndarray) -> np.ndarray:
+        """Return Tᵀ f of a torn force of this rank, (torn_size,): none is left on dependent nodes."""
+        own = zip(self.meshes, self.parts, strict=True)
+        return np.concatenate([np.zeros(0), *(mesh.following.force(force[part]) for mesh, part in own)])
+
     @cached_property
     def following(self) -> sp.csr_matrix:
         """T on this rank's torn vectors: dependent nodes at the displacement of others."""
