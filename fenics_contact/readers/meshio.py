@@ -512,7 +512,8 @@ def _read_by_meshio(path: Path, file_format: str | None) -> meshio.Mesh:
 
     said = io.StringIO()
     try:
-        with redirect_stdout(said), redirect_stderr(said):
+        # Whether an STL file is binary it asks by a product of letters, which overflows in NumPy 2.
+        with redirect_stdout(said), redirect_stderr(said), np.errstate(over="ignore"):
             return meshio.read(path, file_format)
     except ImportError as reason:
         raise InvalidInputError(

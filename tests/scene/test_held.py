@@ -178,7 +178,7 @@ def test_a_load_that_is_nothing_beside_the_bound_of_friction_is_held() -> None:
     lower, upper = rectangle((0.0, 0.0), (2.0, 1.0), (3, 1)), rectangle((0.0, 1.0), (2.0, 1.8), (2, 1))
     bodies = {"low": Body(lower, PlaneStrain(1.0, 0.3)), "up": Body(upper, PlaneStrain(1.0, 0.3))}
     pair = ContactPair(Surface("up", "y0"), Surface("low", "y1"), Tresca(0.05))
-    load = 0.02 * abs(1.0 - sum([0.1] * 10))
+    load = 0.02 * 2.0**-53  # of 1 − Σ 0.1, which Python sums exactly from 3.12 on
     scene = Scene(bodies, [Support("low", "y0")], [TotalForce("up", "y1", (0.0, -load))], contacts=[pair])
     state = solve_scene(scene, MPI.COMM_SELF)
     assert 0.0 < load < 1e-17
