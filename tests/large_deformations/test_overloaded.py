@@ -21,6 +21,7 @@ from fenics_contact import (
 )
 from fenics_contact._base import progress
 from fenics_contact._base.progress import Event, Kind
+from fenics_contact._large_deformations.newton import TangentNewton
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import NeoHooke
@@ -52,10 +53,11 @@ def test_an_overloaded_pad_gives_up_attempts_in_vain_and_reports_them(
     history = error.value.history
     starts = [i for i, line in enumerate(history) if line.iteration == 0] + [len(history)]
     attempts = [history[i:j] for i, j in pairwise(starts)]
-    vain = [len(each) for each in attempts if each[-1].residuals.worst > 1e-2]
+    vain = [each for each in attempts if each[-1].residuals.worst > 1e-2]
     assert len(vain) > 2
-    assert max(vain) <= 20
-    assert min(vain) <= 9
+    assert max(len(each) for each in vain) <= 20
+    four_stalls = 1 + 4 * TangentNewton().patience
+    assert any(len(each) < four_stalls and "7 soft motions held" in each[-1].note for each in vain)
     told = [each for each in events if each.what == "load step in parts"]
     reached = re.search(r"up to (0\.\d+) of", str(error.value))
     assert reached is not None
