@@ -34,12 +34,11 @@ def prescribed_as_is(torn: TornSystem, displacement: np.ndarray, after: Decompos
     known, axes = prescribed_along(torn.scene, torn.decomposition.tearing)
     there, nodes = np.zeros_like(known), np.flatnonzero(after.fixed.any(axis=1))
     there[nodes] = nodal_mean_at(after, displacement, nodes)
-    there = there if after.axes is None else after.axes.to_local(there)
+    there = after.axes.to_local(there)
     kept = ~np.isnan(known) & ~_moving(torn)[:, None]
     if not same_axes(axes, after.axes):
         for each in (axes, after.axes):
-            if each is not None:
-                kept[each.nodes] = False
+            kept[each.nodes] = False
     return np.where(after.fixed, np.where(kept, known, there), np.nan)
 
 
@@ -93,8 +92,7 @@ def _kept(support: AnySupport, scene: Scene, before: State) -> AnySupport:
         return replace(support, displacement=NodeValues(mesh.points[nodes], along))
     known, axes = prescribed_along(before.torn.scene, tearing)
     plain = ~_moving(before.torn)
-    if axes is not None:
-        plain[axes.nodes] = False
+    plain[axes.nodes] = False
     moved = np.where(~np.isnan(known[every]) & plain[every, None], known[every], moved)
     value = [
         NodeValues(mesh.points[nodes], moved[:, k]) if isinstance(each, Kept) else each

@@ -183,14 +183,14 @@ def unsymmetric_at(
     skew = sp.coo_matrix((stiffness - stiffness.T) / 2)
     row, column = dof[skew.row], dof[skew.col]
     free = (~decomposition.fixed).ravel()
-    if decomposition.axes is not None:  # there components of the coordinates are neither free nor held
-        free.reshape(-1, dim)[decomposition.axes.nodes] = True
+    # There components of the coordinates are neither free nor held.
+    free.reshape(-1, dim)[decomposition.axes.nodes] = True
     kept = nodes[row // dim] & free[row] & free[column]
     mine = (row[kept], column[kept], skew.data[kept], float(np.abs(stiffness.data).max(initial=0.0)))
     parts = decomposition.comm.allgather(mine)
     rows, columns, values = (np.concatenate([part[place] for part in parts]) for place in range(3))
     matrix = sp.csr_matrix((values, (rows, columns)), shape=(len(free),) * 2)
-    if decomposition.axes is not None:
+    if decomposition.axes:
         onto = free_matrix(decomposition.fixed, decomposition.axes)
         matrix = (onto @ matrix @ onto).tocsr()
     # Between neighbours it cancels but for rounding.
@@ -276,7 +276,7 @@ class TurningRows(RowGroup):
 
     fields: sp.csr_matrix
     owner: np.ndarray
-    axes: LocalAxes | None
+    axes: LocalAxes
 
     @property
     def count(self) -> int:
@@ -286,9 +286,9 @@ class TurningRows(RowGroup):
     def rows(self, tearing: Tearing, fixed: np.ndarray) -> Rows:
         """Return these rows of B."""
         fields, axes = self.fields, self.axes
-        entries = (fields if axes is None else free_matrix(fixed, axes) @ fields).T.tocoo()
+        entries = (free_matrix(fixed, axes) @ fields if axes else fields).T.tocoo()
         node, component = np.divmod(entries.col, tearing.components)
-        free = ~fixed[node, component] if axes is None else np.full(len(node), True)
+        free = np.full(len(node), True) if axes else ~fixed[node, component]
         row, value = entries.row[free], entries.data[free]
         return on_copies(tearing, row, node[free], component[free], value, self.owner)
 
@@ -573,7 +573,7 @@ class MovingContact(Contact):
         coordinates[self._nodes] += nodal_mean_at(load.torn.decomposition, displacement, self._nodes)
         # Prescribed components reach their values within the step: gaps are those after it.
         moved, axes = coordinates - self._places, load.torn.decomposition.axes
-        if axes is None:
+        if not axes:
             return np.where(np.isnan(load.prescribed), coordinates, self._places + load.prescribed)
         local = np.where(np.isnan(load.prescribed), axes.to_local(moved), load.prescribed)
         return np.asarray(self._places + axes.to_global(local))

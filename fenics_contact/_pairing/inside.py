@@ -406,7 +406,7 @@ def _keys(points: ContactPoints) -> np.ndarray:
 
 
 def points_inside(
-    scene: Scene, points: ContactPoints, places: InFacets, fixed: np.ndarray, axes: LocalAxes | None
+    scene: Scene, points: ContactPoints, places: InFacets, fixed: np.ndarray, axes: LocalAxes
 ) -> ContactPoints:
     """Return contact points of which some lie inside facets of their slaves, all others at their nodes.
 

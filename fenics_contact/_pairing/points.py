@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from fenics_contact._base.display import displayed
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
-from fenics_contact._scene.local_axes import LocalAxes, free_part
+from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, free_part
 from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tresca
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
@@ -292,14 +292,13 @@ class FreeSpaces:
     projectors: np.ndarray
 
     @classmethod
-    def of(cls, points: ContactPoints, fixed: np.ndarray, axes: LocalAxes | None) -> FreeSpaces:
+    def of(cls, points: ContactPoints, fixed: np.ndarray, axes: LocalAxes) -> FreeSpaces:
         """Return those of points; `fixed`: whether components are prescribed, along the axes of nodes."""
         dim, components = points.normal.shape[1], movable(points, fixed)
-        if axes is None and points.tilted is None and points.turns is None:
+        if not axes and points.tilted is None and points.turns is None:
             return cls(components, np.zeros(0, dtype=np.int64), np.zeros((0, dim, dim)))
         turned = np.zeros(fixed.shape[0], dtype=bool)
-        if axes is not None:
-            turned[axes.nodes] = True
+        turned[axes.nodes] = True
         touched = np.asarray(abs(points.jump) @ turned.astype(float)) > 0.0
         if points.tilted is not None:
             touched |= points.tilted.any(axis=(1, 2))
@@ -345,7 +344,7 @@ class FreeSpaces:
         return single, held
 
 
-def in_free_frames(points: ContactPoints, fixed: np.ndarray, axes: LocalAxes | None = None) -> ContactPoints:
+def in_free_frames(points: ContactPoints, fixed: np.ndarray, axes: LocalAxes = NO_AXES) -> ContactPoints:
     """Return points whose second tangent is the only direction of slip where supports leave one.
 
     Where one component is held, closed points can slip only normal to that axis and the normal.
@@ -508,7 +507,7 @@ def without_tied(
     ties: ContactPoints,
     scene: Scene,
     fixed: np.ndarray,
-    axes: LocalAxes | None,
+    axes: LocalAxes,
     advice: Notices,
     comm: MPI.Comm,
 ) -> ContactPoints:
@@ -530,7 +529,7 @@ def tied_keys(
     ties: ContactPoints,
     scene: Scene,
     fixed: np.ndarray,
-    axes: LocalAxes | None = None,
+    axes: LocalAxes = NO_AXES,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return pair and slave node of the points that `without_tied` leaves out."""
     point = np.unique(_tied(points, ties, scene, fixed, axes)[0])
@@ -538,7 +537,7 @@ def tied_keys(
 
 
 def tied_once(
-    ties: ContactPoints, scene: Scene, fixed: np.ndarray, axes: LocalAxes | None = None
+    ties: ContactPoints, scene: Scene, fixed: np.ndarray, axes: LocalAxes = NO_AXES
 ) -> ContactPoints:
     """Return the points of ties without those of which another tie holds all, the first one of equals.
 
@@ -632,7 +631,7 @@ def _tied(
     ties: ContactPoints,
     scene: Scene,
     fixed: np.ndarray,
-    axes: LocalAxes | None,
+    axes: LocalAxes,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers of contact points and tied ones that hold the same displacement."""
     point, tied, _ = _same_places(points, ties)
@@ -645,7 +644,7 @@ def _held(
     ties: ContactPoints,
     tied: np.ndarray,
     scene: Scene,
-    supported: tuple[np.ndarray, LocalAxes | None],
+    supported: tuple[np.ndarray, LocalAxes],
 ) -> np.ndarray:
     """Return whether tied points hold displacements along normals, shape (n, dim)."""
     sliding = are_sliding(scene.ties, ties.pair[tied])

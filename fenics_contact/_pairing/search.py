@@ -37,7 +37,7 @@ from fenics_contact._pairing.points import (
 )
 from fenics_contact._pairing.projection import shared_projection
 from fenics_contact._pairing.tips import carrying
-from fenics_contact._scene.local_axes import LocalAxes
+from fenics_contact._scene.local_axes import NO_AXES, LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
@@ -314,7 +314,7 @@ def find_contact_points(
     fixed: np.ndarray,
     comm: MPI.Comm | None = None,
     *,
-    axes: LocalAxes | None = None,
+    axes: LocalAxes = NO_AXES,
     finer: bool = False,
     advice: Advice = SILENCE,
 ) -> ContactPoints:
@@ -334,7 +334,7 @@ def find_tied_points(
     fixed: np.ndarray,
     comm: MPI.Comm | None = None,
     *,
-    axes: LocalAxes | None = None,
+    axes: LocalAxes = NO_AXES,
     advice: Advice = SILENCE,
 ) -> ContactPoints:
     """Find the points of tied surfaces, as `find_contact_points`; ``pair`` numbers the ties. Collective."""
@@ -386,7 +386,7 @@ class _Side:
 def _points_of_pairs(
     scene: Scene,
     pairs: Sequence[ContactPair | AnyTie],
-    supported: tuple[np.ndarray, LocalAxes | None],
+    supported: tuple[np.ndarray, LocalAxes],
     comm: MPI.Comm,
     finer: bool = False,
     advice: Advice = SILENCE,
@@ -422,7 +422,7 @@ def _measured(
     scene: Scene,
     pair: ContactPair | AnyTie,
     index: int,
-    supported: tuple[np.ndarray, LocalAxes | None],
+    supported: tuple[np.ndarray, LocalAxes],
     comm: MPI.Comm,
     finer: bool,
     advice: Advice,
@@ -465,7 +465,7 @@ def _measured(
                 check_sides(pair, scene.sector_angle(pair), slave.surface, master.surface)
         assert isinstance(pair.master, Surface)
         advice.surface(scene, pair.master, pair.geometry, master.surface, comm)
-        if isinstance(pair, Tie) and not pair.sliding and axes is None:
+        if isinstance(pair, Tie) and not pair.sliding and not axes:
             one, other = ((side.surface, fixed[side.nodes]) for side in (slave, master))
             advice.free_master(pair, one, other, comm)
         if pair.discretisation == "mortar":

@@ -57,7 +57,7 @@ def check_held_alike(
     ties: ContactPoints,
     scene: Scene,
     fixed: np.ndarray,
-    axes: LocalAxes | None,
+    axes: LocalAxes,
     slight: float = 0.05,
 ) -> None:
     """Reject supports that hold a slave of a sector in a direction in which its master is free.
@@ -73,10 +73,7 @@ def check_held_alike(
         return
     dim = fixed.shape[1]
     for axis in range(dim):
-        own = np.tile(np.eye(dim)[axis], (len(which), 1))
-        if axes is not None:
-            place = axes.place(tied.slave[which])
-            own[place >= 0] = axes.axes[place[place >= 0], axis]
+        own = axes.along(tied.slave[which], np.full(len(which), axis), dim)
         held = np.flatnonzero(fixed[tied.slave[which], axis])
         row, node, weight, along = tied.entries(which[held], own[held])
         free = np.linalg.norm(weight[:, None] * free_part(along, node, fixed, axes), axis=1)

@@ -25,14 +25,27 @@ class LocalAxes:
     nodes: np.ndarray
     axes: np.ndarray
 
+    def __bool__(self) -> bool:
+        """Return whether some nodes have axes of their own."""
+        return len(self.nodes) > 0
+
     def after(self, first: int) -> LocalAxes:
         """Return the axes of nodes that are numbered from another first one."""
         return LocalAxes(self.nodes + first, self.axes)
 
     def place(self, nodes: np.ndarray) -> np.ndarray:
         """Return the positions of nodes among those with axes of their own, −1 for others."""
+        if not self:
+            return np.full(len(nodes), -1)
         index = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
         return np.where(self.nodes[index] == nodes, index, -1)
+
+    def along(self, nodes: np.ndarray, component: np.ndarray, dim: int) -> np.ndarray:
+        """Return the axes of components of nodes as unit vectors, shape (n, dim)."""
+        result, place = np.eye(dim)[component], self.place(nodes)
+        turned = place >= 0
+        result[turned] = self.axes[place[turned], component[turned]]
+        return result
 
     def to_local(self, values: np.ndarray) -> np.ndarray:
         """Return the components of vectors of all nodes along their axes, both (n_nodes, dim, ...)."""
@@ -58,30 +71,32 @@ class LocalAxes:
         return sp.csr_matrix((entries, places), shape=(dim * n_nodes,) * 2)
 
 
-def joined_axes(parts: Sequence[LocalAxes | None]) -> LocalAxes | None:
-    """Return the axes of several groups of nodes, numbered in their order; None if there are none."""
-    known = [part for part in parts if part is not None]
+#: Of nodes all of which have the axes of the coordinates.
+NO_AXES = LocalAxes(np.zeros(0, dtype=np.int64), np.zeros((0, 1, 1)))
+
+
+def joined_axes(parts: Sequence[LocalAxes]) -> LocalAxes:
+    """Return the axes of several groups of nodes, numbered in their order."""
+    known = [part for part in parts if part]
     if not known:
-        return None
+        return NO_AXES
     nodes, axes = zip(*((part.nodes, part.axes) for part in known), strict=True)
     return LocalAxes(np.concatenate(nodes), np.concatenate(axes))
 
 
-def same_axes(one: LocalAxes | None, other: LocalAxes | None, alike: float = 1e-9) -> bool:
+def same_axes(one: LocalAxes, other: LocalAxes, alike: float = 1e-9) -> bool:
     """Return whether nodes have the same axes, to `alike`."""
-    if one is None or other is None:
-        return one is other
     return np.array_equal(one.nodes, other.nodes) and np.allclose(one.axes, other.axes, rtol=0.0, atol=alike)
 
 
-def free_part(vectors: np.ndarray, node: np.ndarray, fixed: np.ndarray, axes: LocalAxes | None) -> np.ndarray:
+def free_part(vectors: np.ndarray, node: np.ndarray, fixed: np.ndarray, axes: LocalAxes) -> np.ndarray:
     """Return the parts of vectors at nodes along which these are free.
 
     `vectors`: shape (m, dim); `node`: the node of each, shape (m,); `fixed`: whether a component of a node
     is prescribed, shape (n_nodes, dim), along its `axes`.
     """
     result = np.where(fixed[node], 0.0, vectors)
-    if axes is not None:
+    if axes:
         place = axes.place(node)
         at = np.flatnonzero(place >= 0)
         turned = axes.axes[place[at]]
@@ -94,8 +109,11 @@ def free_part(vectors: np.ndarray, node: np.ndarray, fixed: np.ndarray, axes: Lo
 
 def free_matrix(fixed: np.ndarray, axes: LocalAxes) -> sp.csr_matrix:
     """Return `free_part` on all components of all nodes, shape (n_nodes · dim, n_nodes · dim)."""
+    free = sp.diags((~fixed).ravel().astype(float))
+    if not axes:
+        return sp.csr_matrix(free)
     turn = axes.matrix(len(fixed))
-    result = (turn.T @ sp.diags((~fixed).ravel().astype(float)) @ turn).tocsr()
+    result = (turn.T @ free @ turn).tocsr()
     result.eliminate_zeros()
     return sp.csr_matrix(result)
 
@@ -127,7 +145,7 @@ class HeldDirections:
 
 def held_along(
     prescribed: np.ndarray, supports: Sequence[HeldDirections], body: str
-) -> tuple[np.ndarray, LocalAxes | None]:
+) -> tuple[np.ndarray, LocalAxes]:
     """Hold nodes along directions, in addition to prescribed components.
 
     Each node gets orthonormal axes, and the held ones of these span the directions that are held there: the
@@ -135,7 +153,7 @@ def held_along(
 
     `prescribed`: components of the nodes of a body, NaN where free, shape (n_nodes, dim), [length].
 
-    Returns the components along the axes, NaN where free, and the axes, None if all are the coordinates'.
+    Returns the components along the axes, NaN where free, and the axes.
     """
     nodes = np.unique(np.concatenate([each.nodes for each in supports]))
     dim = prescribed.shape[1]
@@ -147,7 +165,7 @@ def held_along(
     result = prescribed.copy()
     result[nodes] = values
     turned = np.flatnonzero((axes != np.eye(dim)).any(axis=(1, 2)))
-    return result, LocalAxes(nodes[turned], axes[turned]) if len(turned) else None
+    return result, LocalAxes(nodes[turned], axes[turned])
 
 
 def _hold(

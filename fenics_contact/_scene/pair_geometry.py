@@ -560,7 +560,7 @@ def _moved_by_supports(scene: SceneParts, name: str) -> np.ndarray:
     prescribed, axes = scene.prescribed_along(name)
     prescribed = prescribed[:, : scene.dim]
     given = ~np.isnan(prescribed)
-    along = modes if axes is None else axes.to_local(modes)
+    along = axes.to_local(modes)
     motion = np.linalg.lstsq(along[given], prescribed[given], rcond=None)[0]
     return np.asarray(modes @ motion)
 

@@ -26,7 +26,7 @@ from fenics_contact._scene.loads import (
     TotalForce,
     require_region,
 )
-from fenics_contact._scene.local_axes import HeldDirections, LocalAxes, held_along, same_axes
+from fenics_contact._scene.local_axes import NO_AXES, HeldDirections, LocalAxes, held_along, same_axes
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface, pressures_of
 from fenics_contact._scene.preloads import Preload
@@ -369,8 +369,8 @@ class SceneParts:
 
     def prescribed_along(
         self, body: str, supports: Sequence[AnySupport] | None = None
-    ) -> tuple[np.ndarray, LocalAxes | None]:
-        """Return what `prescribed` returns, and along which axes; None: all along the coordinates'."""
+    ) -> tuple[np.ndarray, LocalAxes]:
+        """Return what `prescribed` returns, and along which axes."""
         chosen = self.supports if supports is None else supports
         values = np.full((self.bodies[body].mesh.n_nodes, self.components), np.nan)
         for support in chosen:
@@ -400,7 +400,7 @@ class SceneParts:
 
     def held_by_rollers(
         self, body: str, prescribed: np.ndarray, supports: Sequence[AnySupport] | None = None
-    ) -> tuple[np.ndarray, LocalAxes | None]:
+    ) -> tuple[np.ndarray, LocalAxes]:
         """Return prescribed components of a body with those of rollers and sectors, and along which axes.
 
         `prescribed`: those of other supports, NaN where free, shape (n_nodes, dim), [length].
@@ -411,7 +411,7 @@ class SceneParts:
         if supports is None:
             held += self._held_on_axes(body)
         if not any(len(each.nodes) for each in held):
-            return prescribed, None
+            return prescribed, NO_AXES
         return held_along(prescribed, held, body)
 
     def _held_on_axes(self, body: str) -> list[HeldDirections]:

@@ -139,7 +139,7 @@ def held_components(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarr
     loose = [each for each in scene.supports if isinstance(each, RigidSurface) and each.free.any()]
     firm = [each for each in scene.supports if each not in loose]
     prescribed, axes = scene.prescribed_along(body, firm)
-    rows = [(modes if axes is None else axes.to_local(modes))[~np.isnan(prescribed)]]
+    rows = [axes.to_local(modes)[~np.isnan(prescribed)]]
     for surface in loose:
         if surface.body == body:
             rows.append(_of_point(surface, mesh, modes)[0][~surface.free])

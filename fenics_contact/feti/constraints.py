@@ -23,7 +23,7 @@ from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.following import followed_nodes
 from fenics_contact._pairing.points import HELD, ContactPoints
 from fenics_contact._scene.constraints import LinearConstraint
-from fenics_contact._scene.local_axes import LocalAxes, free_matrix
+from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, free_matrix
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
@@ -60,7 +60,7 @@ class ConstraintRows(Joint):
     free: sp.csr_matrix
     components: int
     fixed: np.ndarray
-    axes: LocalAxes | None = None
+    axes: LocalAxes = NO_AXES
 
     @classmethod
     def key(cls, scene: Scene) -> Sequence[object]:
@@ -86,9 +86,7 @@ class ConstraintRows(Joint):
         return (found,)
 
     @classmethod
-    def built(
-        cls, scene: Scene, tearing: Tearing, fixed: np.ndarray, axes: LocalAxes | None
-    ) -> ConstraintRows:
+    def built(cls, scene: Scene, tearing: Tearing, fixed: np.ndarray, axes: LocalAxes) -> ConstraintRows:
         """Return those of a scene; `fixed`: see `Relations.rows`."""
         equations, first = _equations(scene, tearing)
         size = _lengths(equations)
@@ -152,8 +150,7 @@ class ConstraintRows(Joint):
 
     def moved(self, prescribed: np.ndarray) -> np.ndarray:
         """Return prescribed displacements, zero where free, along the coordinates' axes, (n_dofs,)."""
-        known = np.nan_to_num(prescribed)
-        return np.asarray((known if self.axes is None else self.axes.to_global(known)).ravel())
+        return self.axes.to_global(np.nan_to_num(prescribed)).ravel()
 
     def columns(self, fields: sp.csr_matrix) -> sp.csr_matrix:
         """Return by how much fields of nodes, (n_nodes · components, n), close the rows, (n_rows, n)."""
@@ -237,10 +234,9 @@ class ConstraintRows(Joint):
         return np.asarray(self.whole[:, own] @ modes.reshape(-1, modes.shape[2])).T
 
 
-def _onto_free(fixed: np.ndarray, axes: LocalAxes | None) -> sp.csr_matrix:
+def _onto_free(fixed: np.ndarray, axes: LocalAxes) -> sp.csr_matrix:
     """Return the projection onto free components, see `ConstraintRows`."""
-    free = sp.diags((~fixed).ravel().astype(float))
-    return sp.csr_matrix(free if axes is None else free_matrix(fixed, axes))
+    return free_matrix(fixed, axes)
 
 
 def _equations(scene: Scene, tearing: Tearing) -> tuple[sp.csr_matrix, np.ndarray]:

@@ -19,7 +19,7 @@ from fenics_contact._pairing.points import (
     friction_data,
     reach_of,
 )
-from fenics_contact._scene.local_axes import LocalAxes, free_part
+from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, free_part
 from fenics_contact._scene.scene import Scene
 from fenics_contact.feti.decomposition import Rows, Tearing
 from fenics_contact.feti.initial_gaps import gap_with_room
@@ -37,13 +37,13 @@ class Relations(RowGroup):
     Attributes:
         which: Point of each row, shape (n_rows,).
         directions: d of each row, shape (n_rows, dim).
-        axes: Axes of nodes along which supports prescribe components; None: the coordinates' everywhere.
+        axes: Axes of nodes along which supports prescribe components.
     """
 
     points: ContactPoints
     which: np.ndarray
     directions: np.ndarray
-    axes: LocalAxes | None = field(default=None, kw_only=True)
+    axes: LocalAxes = field(default=NO_AXES, kw_only=True)
 
     @property
     def count(self) -> int:
@@ -65,7 +65,7 @@ class Relations(RowGroup):
         `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
         """
         known = np.nan_to_num(prescribed)
-        along = self.measured(known if self.axes is None else self.axes.to_global(known))
+        along = self.measured(self.axes.to_global(known))
         # What is left of motions that cancel is none: slip along it would have friction.
         least = LAST_PLACES * np.abs(known).max(initial=0.0)
         return np.where(np.abs(along) <= least, 0.0, along)
@@ -132,7 +132,7 @@ class NormalRows(Relations):
     closures: Closures | None = field(default=None, kw_only=True)
 
     @classmethod
-    def of(cls, scene: Scene, points: ContactPoints, axes: LocalAxes | None = None) -> NormalRows:
+    def of(cls, scene: Scene, points: ContactPoints, axes: LocalAxes = NO_AXES) -> NormalRows:
         """Return those of the contact points of a scene."""
         every = np.arange(points.count)
         return cls(points, every, -points.normal, axes=axes, closures=closures_of(scene, points))
@@ -219,7 +219,7 @@ class TangentialRows(Relations):
         points: ContactPoints,
         prescribed: np.ndarray,
         comm: MPI.Comm,
-        axes: LocalAxes | None = None,
+        axes: LocalAxes = NO_AXES,
     ) -> TangentialRows:
         """Return those of the contact points of a scene. Collective on ``comm``.
 

@@ -17,7 +17,7 @@ from fenics_contact._base.libraries import MPI, PETSc, free_communicators, start
 from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
-from fenics_contact._scene.local_axes import LocalAxes, joined_axes, same_axes
+from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, joined_axes, same_axes
 from fenics_contact._scene.memory import require_memory
 from fenics_contact._scene.revolution import hold_axis
 from fenics_contact._scene.scene import Scene
@@ -210,7 +210,7 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
     return prescribed_along(scene, tearing)[0]
 
 
-def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalAxes | None]:
+def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalAxes]:
     """Collect the supports node by node, with the axes of nodes that rollers hold.
 
     Returns the value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length], and
@@ -242,7 +242,7 @@ def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalA
         first = tearing.first_of(body)
         every = slice(first, first + scene.bodies[body].mesh.n_nodes)
         prescribed[every], axes = scene.held_by_rollers(body, prescribed[every])
-        parts.append(None if axes is None else axes.after(first))
+        parts.append(axes.after(first))
     return prescribed, joined_axes(parts)
 
 
@@ -273,15 +273,15 @@ class GluingRows:
             of a load, see `right_side`.
         dof: Node and component that each row belongs to, as node · dim + component, shape (n_rows,).
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-        axes: Axes of nodes along which the components are; None: the coordinates' everywhere.
+        axes: Axes of nodes along which the components are.
     """
 
     rows: Rows
     dof: np.ndarray
     fixed: np.ndarray
-    axes: LocalAxes | None = None
+    axes: LocalAxes = NO_AXES
 
-    def right_side(self, prescribed: np.ndarray, axes: LocalAxes | None = None) -> np.ndarray:
+    def right_side(self, prescribed: np.ndarray, axes: LocalAxes = NO_AXES) -> np.ndarray:
         """Return c of the rows for displacements from `prescribed_along`."""
         if not same_axes(axes, self.axes):
             raise InvalidInputError(
@@ -301,7 +301,7 @@ class GluingRows:
 def gluing_rows(
     tearing: Tearing,
     fixed: np.ndarray,
-    axes: LocalAxes | None = None,
+    axes: LocalAxes = NO_AXES,
     dependent: Sequence[int] | np.ndarray = (),
     rank: int | None = None,
 ) -> GluingRows:
@@ -327,7 +327,7 @@ def gluing_rows(
         glued = touched & ~fixed & (multiplicity == copies)[:, None]
         parts.append(_glued_entries(tearing, glued, start, int(copies)))
     row, copy, component, entry = (np.concatenate(column) for column in zip(*parts, strict=True))
-    if axes is not None:
+    if axes:
         row, copy, component, entry = _turned_entries(tearing, axes, row, copy, component, entry)
     row, copy, component, entry = (each[here[copy]] for each in (row, copy, component, entry))
 
@@ -458,8 +458,8 @@ class Decomposition:
         return self.gluing.fixed
 
     @property
-    def axes(self) -> LocalAxes | None:
-        """Axes of nodes along which components are prescribed or free; None: the coordinates' everywhere."""
+    def axes(self) -> LocalAxes:
+        """Axes of nodes along which components are prescribed or free."""
         return self.gluing.axes
 
     def holding(self, scene: Scene) -> Decomposition:

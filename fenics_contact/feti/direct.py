@@ -136,7 +136,7 @@ class DirectSystem:
 def _turned(torn: TornSystem) -> sp.csr_matrix | None:
     """Return the matrix that turns vectors of the one subdomain into the axes of nodes, None without any."""
     axes = torn.decomposition.axes
-    if axes is None:
+    if not axes:
         return None
     (mesh,) = torn.decomposition.meshes
     block = np.argsort(mesh.nodes)[axes.nodes]  # the one body has all nodes, in blocks of another order

@@ -135,7 +135,7 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
         prescribed, axes = scene.prescribed_along(surface.body, others)
         along = np.zeros((*prescribed.shape, modes.shape[2]))
         along[own] = modes
-        along = (along if axes is None else axes.to_local(along))[own]
+        along = axes.to_local(along)[own]
         _require_room(surface, along, ~np.isnan(prescribed[own]))
         basis, load = _independent(surface, modes.reshape(-1, modes.shape[2]), load)
         node, component = np.indices(modes.shape[:2]).reshape(2, -1)

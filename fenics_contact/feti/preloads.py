@@ -17,7 +17,7 @@ from fenics_contact._pairing.points import (
     reference_axes,
     tangent_frames,
 )
-from fenics_contact._scene.local_axes import LocalAxes, free_part
+from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, free_part
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sections import held_at
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
@@ -156,7 +156,7 @@ def _section_points(
     ties: ContactPoints,
     numbers: NodeNumbers,
     fixed: np.ndarray,
-    axes: LocalAxes | None = None,
+    axes: LocalAxes = NO_AXES,
     slight: float = 1e-9,
 ) -> ContactPoints:
     """Return the nodes on both sides of all sections as tied points, whose slaves lie behind them.

@@ -71,12 +71,7 @@ class BondedPoints(JoinedPoints):
 def bonded_rows(points: ContactPoints, decomposition: Decomposition) -> tuple[np.ndarray, np.ndarray]:
     """Return points and directions of rows along all components that supports leave free on the slaves."""
     which, component = np.nonzero(~decomposition.fixed[points.slave])
-    along, axes = np.eye(points.normal.shape[1])[component], decomposition.axes
-    if axes is not None:
-        place = axes.place(points.slave[which])
-        turned = place >= 0
-        along[turned] = axes.axes[place[turned], component[turned]]
-    return which, along
+    return which, decomposition.axes.along(points.slave[which], component, points.normal.shape[1])
 
 
 class TieRows(JoinedPoints):

@@ -84,9 +84,7 @@ def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndar
     for joint, forces in joints.items():
         joined += joint.on_nodes(forces)
     acting = -nodal_sum(decomposition, torn.force(multiplier)) - joined
-    reaction = np.where(fixed, acting, 0.0)
-    if axes is not None:
-        reaction = axes.to_global(np.where(fixed, axes.to_local(acting), 0.0))
+    reaction = axes.to_global(np.where(fixed, axes.to_local(acting), 0.0))
     return NodalForces(
         torn.scene.points,
         nodal_sum(decomposition, torn.load),

@@ -29,7 +29,7 @@ from fenics_contact._pairing.sliding.meeting import Meeting, meetings_of, shared
 from fenics_contact._pairing.sliding.points import SlidingPoints, with_given_offsets
 from fenics_contact._pairing.sliding.slip import LastPoints, MaterialPoints
 from fenics_contact._pairing.sliding.stiffness import Differential, join_differentials, without_patches
-from fenics_contact._scene.local_axes import LocalAxes
+from fenics_contact._scene.local_axes import NO_AXES, LocalAxes
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidTool
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.tools import ToolBody
@@ -87,7 +87,7 @@ class SlidingContact:
     comm: MPI.Comm
     reach: float
     meetings: tuple[Meeting, ...]
-    axes: LocalAxes | None = None
+    axes: LocalAxes = NO_AXES
 
     @classmethod
     def of(
@@ -97,7 +97,7 @@ class SlidingContact:
         comm: MPI.Comm | None = None,
         *,
         reach: float = np.inf,
-        axes: LocalAxes | None = None,
+        axes: LocalAxes = NO_AXES,
     ) -> SlidingContact:
         """Prepare the pairs of a scene. Collective on ``comm``.
 

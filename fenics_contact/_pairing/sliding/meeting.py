@@ -15,7 +15,7 @@ from fenics_contact._pairing.search import find_contact_points, find_tied_points
 from fenics_contact._pairing.sliding.closest import ClosestPoints, Roles, moved_surface
 from fenics_contact._pairing.sliding.patches import SmoothPatches
 from fenics_contact._pairing.tips import carrying
-from fenics_contact._scene.local_axes import LocalAxes
+from fenics_contact._scene.local_axes import NO_AXES, LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidPlane
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import slave_of, surface_of
@@ -134,7 +134,7 @@ class Meeting:
 
 
 def meetings_of(
-    scene: Scene, fixed: np.ndarray, comm: MPI.Comm, axes: LocalAxes | None = None
+    scene: Scene, fixed: np.ndarray, comm: MPI.Comm, axes: LocalAxes = NO_AXES
 ) -> tuple[Meeting, ...]:
     """Return the pairs of a scene in its reference configuration. Collective.
 
