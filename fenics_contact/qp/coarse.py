@@ -27,12 +27,10 @@ RANK_TOLERANCE = 1e-12
 class GramInverse:
     """Generalised inverse of S = G G^T, which may be rank deficient.
 
-    S is scaled to unit diagonal first, because its rows mix translations and rotations. A well conditioned
-    S is factored by Cholesky; otherwise its eigenvectors separate the null space, and the inverse acts on the
-    complement. For any generalised inverse G^T S^- G is the same projector.
-
-    Attributes:
-        null_space: Columns z with S z = 0, shape (m, m - rank): motions that no multiplier resists.
+    S is scaled to unit diagonal first, because its rows mix translations and rotations. A well conditioned S
+    is factored by Cholesky; otherwise its eigenvectors separate the null space, and the inverse acts on the
+    complement. For any generalised inverse G^T S^- G is the same projector. `null_space`: columns z with S z
+    = 0: motions that no multiplier resists.
     """
 
     def __init__(self, matrix: Vector) -> None:
@@ -99,9 +97,6 @@ class SparseGramInverse:
 
     Null vectors are computed by inverse iteration with a few vectors, which converges at once for a matrix
     that is singular to rounding.
-
-    Attributes:
-        null_space: Columns z with S z = 0, shape (m, m - rank): motions that no multiplier resists.
     """
 
     def __init__(self, comm: MPI.Comm, share: sp.csr_matrix) -> None:
@@ -186,15 +181,11 @@ class Composed:
 class CoarseSpace:
     """Equilibrium of all rigid motions, G lambda = e, with P = I - G^T (G G^T)^-1 G.
 
-    Column j of G holds the resultants of the j-th multiplier on every rigid motion. Columns are
-    distributed like the multipliers; everything of length m (right side, coefficients) is replicated. The
-    matrix G G^T is dense and factored on every rank while it is small; beyond `DENSE_LIMIT` it is sparse and
-    factored on a few ranks, and every solution is broadcast. With m = 0 all methods are cheap and do nothing.
-
-    Attributes:
-        comm: Communicator over which the multipliers are distributed.
-        matrix: This rank's columns of G, shape (m, n_owned), CSR.
-        load: Right side e, shape (m,), replicated.
+    Column j of G holds the resultants of the j-th multiplier on every rigid motion. Columns are distributed
+    like the multipliers; everything of length m (right side, coefficients) is replicated. The matrix G G^T is
+    dense and factored on every rank while it is small; beyond `DENSE_LIMIT` it is sparse and factored on a
+    few ranks, and every solution is broadcast. With m = 0 all methods are cheap and do nothing. `matrix`:
+    this rank's columns of G, CSR; `load`: right side e, replicated.
     """
 
     def __init__(
@@ -208,8 +199,7 @@ class CoarseSpace:
     ) -> None:
         """Store this rank's columns.
 
-        `G`: this rank's columns, sparse, shape (m, n_owned); `e`: right side, shape (m,), the same on every
-        rank; `gram`: G G^T where it is known, or what makes its inverse, collective; `eliminate`: reduces the
+        `gram`: G G^T where it is known, or what makes its inverse, collective; `eliminate`: reduces the
         matrices of faces beyond `DENSE_LIMIT`.
         """
         self.comm = comm
@@ -323,9 +313,8 @@ class CoarseSpace:
     ) -> CoarseSpace:
         """Return the coarse space G Z of a face with dofs y, multiplier = fixed + Z y. Collective.
 
-        `Z`: this rank's restriction, sparse, shape (n_owned, n_face); `load`: right side for the face, e - G
-        fixed, shape (m,), replicated; e itself by default; `whole`: whether the face has all equality rows
-        and begins with them, Z = [I_E, Z_C].
+        `load`: right side for the face, e - G fixed, replicated; e itself by default; `whole`: whether the
+        face has all equality rows and begins with them, Z = [I_E, Z_C].
         """
         columns, load = self.columns(Z, whole=whole), self.load if load is None else load
         if not isinstance(columns, Composed) or self.eliminate is None or (faces := self.faces) is None:
@@ -370,12 +359,7 @@ def plus(gram: Gram, sparse: sp.csr_matrix) -> Gram:
 
 
 class CoarseInverse(Protocol):
-    """Generalised inverse of G Gᵀ.
-
-    Attributes:
-        rank: Its rank.
-        null_space: Columns z with G Gᵀ z = 0, shape (m, m - rank).
-    """
+    """Generalised inverse of G Gᵀ."""
 
     rank: int
     null_space: Vector
@@ -410,11 +394,7 @@ class FaceGrams(Protocol):
 
 
 class Elimination(Protocol):
-    """Makes the coarse matrices of faces small.
-
-    Attributes:
-        equality: The equality rows among this rank's multipliers, which every face has.
-    """
+    """Makes the coarse matrices of faces small."""
 
     @property
     def equality(self) -> npt.NDArray[np.int64]:
@@ -440,11 +420,7 @@ def invert_square(
 
 
 class DenseSquareInverse:
-    """LU factors of a small matrix, scaled.
-
-    Attributes:
-        condition: Reciprocal condition number; zero where the matrix is singular.
-    """
+    """LU factors of a small matrix, scaled."""
 
     def __init__(self, matrix: Vector, scale: Vector) -> None:
         """Factor a replicated matrix, shape (m, m)."""

@@ -38,11 +38,7 @@ class ClosureCurve(Protocol):
 class Closures:
     """C(λ) = s c(λ / A) of normal forces, with a scale s that is one but for scaled multipliers.
 
-    Attributes:
-        area: A, shape (n,).
-        curve: Number of the curve c, −1 for exact contact, shape (n,).
-        scale: s, shape (n,).
-        curves: The curves.
+    `area`: A; `curve`: number of the curve c, −1 for exact contact; `scale`: s.
     """
 
     area: Vector
@@ -89,9 +85,7 @@ class Closures:
     def resolve(self, trial: Vector, step: Vector, most: int = 200) -> Vector:
         """Return λ ≥ 0 with λ + ρ C(λ) = w, zero where w ≤ 0, shape (n,).
 
-        By Newton's method between bounds: the left side grows at least as λ does.
-
-        `trial`: w, shape (n,); `step`: ρ, shape (n,); `most`: more steps than bisection needs.
+        By Newton's method between bounds: the left side grows at least as λ does. `trial`: w; `step`: ρ.
         """
         upper = np.maximum(trial, 0.0)
         left, right = np.flatnonzero((self.curve >= 0) & (upper > 0.0)), None
@@ -117,13 +111,8 @@ class Closures:
 class SoftRows:
     """The linearised compliances of contacts, C ≈ offset + slope λ, and those of friction discs.
 
-    Attributes:
-        slope: Of contacts, shape (n_contact,).
-        offset: Of contacts, shape (n_contact,).
-        stiffening: 1 + ρ · slope of contacts, shape (n_contact,).
-        step: ρ of contacts, shape (n_contact,).
-        slip: Slip per friction force of discs, shape (n_friction,).
-        slip_step: ρ of discs, shape (n_friction,).
+    `stiffening`: 1 + ρ · slope of contacts; `step`: ρ of contacts; `slip`: slip per friction force of discs;
+    `slip_step`: ρ of discs.
     """
 
     slope: Vector
@@ -164,9 +153,7 @@ class SoftRows:
 class Compliance:
     """What this rank's contact rows give way: C(λ_N) along the normal, D τ along the tangents.
 
-    Attributes:
-        closures: C of the contacts, shape (n_contact,), owned.
-        slip: D of the friction discs, the elastic slip per friction force, shape (n_friction,), owned.
+    `slip`: D of the friction discs, the elastic slip per friction force, owned.
     """
 
     layout: ContactLayout

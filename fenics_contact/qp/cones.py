@@ -161,11 +161,7 @@ class SlipLaw(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class TrescaLaw:
-    """Slip bounds that do not depend on the multiplier.
-
-    Attributes:
-        slip_bound: Ψ, shape (n_friction,), owned.
-    """
+    """Slip bounds that do not depend on the multiplier."""
 
     layout: ContactLayout
     slip_bound: Vector
@@ -210,12 +206,8 @@ class StrengthCurve(Protocol):
 class Strengths:
     """Ψ(λ_N) = min(h(λ_N), Ψ_max) of friction discs, with h = μ λ_N or h = A t(λ_N / A).
 
-    Attributes:
-        coefficient: μ, shape (n,); where there is a curve the least one with t(p) ≤ μ p.
-        limit: Ψ_max, shape (n,), [force]; infinite where there is none.
-        area: A, shape (n,).
-        curve: Number of the curve t, −1 where there is none, shape (n,).
-        curves: The curves.
+    `coefficient`: μ; where there is a curve the least one with t(p) ≤ μ p; `limit`: Ψ_max; infinite where
+    there is none; `area`: A; `curve`: number of the curve t, −1 where there is none.
     """
 
     coefficient: Vector
@@ -274,12 +266,9 @@ class CoulombLaw:
     """Slip bounds Ψ = Ψ₀ + μ max(λ_N, 0): a given part, zero by default, and one that follows λ_N.
 
     With both parts it is the Mohr-Coulomb law, or Tresca's on some discs and Coulomb's on others.
-
-    Attributes:
-        friction_coefficient: μ per friction disc, shape (n_friction,), owned.
-        given: Ψ₀ per friction disc, shape (n_friction,), owned, or one number for all, [force].
-        strengths: What follows λ_N in place of μ λ_N, owned: with a limit, or on a curve. Its coefficients
-            are those above.
+    `friction_coefficient`: μ per friction disc, owned; `given`: Ψ₀ per friction disc, owned, or one number
+    for all; `strengths`: what follows λ_N in place of μ λ_N, owned: with a limit, or on a curve. Its
+    coefficients are those above.
     """
 
     layout: ContactLayout

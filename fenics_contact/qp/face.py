@@ -204,11 +204,7 @@ def turning_discs(layout: ContactLayout, turning: Marks) -> npt.NDArray[np.int64
 def face_basis(
     layout: ContactLayout, closed: Marks, stick: Marks, sliding: Marks, direction: Vector
 ) -> sp.csr_matrix:
-    """Return Z of a face: its columns are orthonormal, shape (size, n_face), owned rows and columns.
-
-    `closed`: contacts whose normal row is free, shape (n_contact,); `stick`: discs of which both rows are
-    free, shape (n_friction,); `direction`: unit vectors of these discs, shape (n_friction, t).
-    """
+    """Return Z of a face: its columns are orthonormal, shape (size, n_face), owned rows and columns."""
     single = np.concatenate([layout.equality, layout.normal[closed], layout.tangential[stick].ravel()])
     across = turning_discs(layout, sliding)
     tangents = np.stack([-direction[across, -1], direction[across, 0]], axis=1)
@@ -231,9 +227,6 @@ def classify(
 
     Contacts with w_N > 0 are closed. Discs with ‖w_T‖ < Ψ, or (1 + ρ_T D) Ψ with a compliance D, stick, the
     others slip along ŵ = w_T/‖w_T‖, and those with Ψ = 0 are pinned.
-
-    `slip_bound`: Ψ, shape (n_friction,), owned; `residual`: r = F λ − d − Gᵀα, owned; `step`: ρ, positive,
-    the same for the components of one disc, shape (size,), owned.
     """
     trial = multiplier - step * residual
     tangential = trial[layout.tangential]

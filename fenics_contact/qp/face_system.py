@@ -28,13 +28,10 @@ from fenics_contact.qp.reductions import Vector, global_max, global_sum
 class FaceSystem:
     """A = Zᵀ F Z + κ on {G Z y = e − G fixed}, with a preconditioner.
 
-    Attributes:
-        comm: Communicator of the ranks.
-        operator: F, owned to owned, collective.
-        preconditioner: Approximation of F⁻¹, owned to owned, or None.
-        patience: Iterations without progress after which an inner solver gives up.
-        spring: 1/ρ of the discs is the diagonal of F divided by this, as for springs of proximal points.
-        single: Whether Krylov methods store directions in single precision, as F is no more accurate.
+    `operator`: F, owned to owned, collective; `preconditioner`: approximation of F⁻¹, owned to owned, or
+    None; `patience`: iterations without progress after which an inner solver gives up; `spring`: 1/ρ of the
+    discs is the diagonal of F divided by this, as for springs of proximal points; `single`: whether Krylov
+    methods store directions in single precision, as F is no more accurate.
     """
 
     comm: MPI.Comm
@@ -128,9 +125,7 @@ class FaceSystems:
 class ObliqueProjector:
     """v ↦ v − G_sᵀ (G_u G_sᵀ)⁻¹ G_u v: removes rigid motions, with range in the kernel of G_u.
 
-    Attributes:
-        tested: G_s, this rank's columns on the test basis, shape (m, n_face).
-        moving: Coarse space of G_u on the moving basis.
+    `tested`: G_s, this rank's columns on the test basis; `moving`: coarse space of G_u on the moving basis.
     """
 
     tested: sp.csr_matrix | Composed
@@ -183,10 +178,7 @@ class DampedEquilibrium:
 
     Near zero normal force, κ exceeds the flexibility of other rows by a factor of a million and more. If such
     offsets moved as far as all others to preserve equilibrium, they would swamp the rest of a residual by κ
-    times as much.
-
-    Attributes:
-        damping: D, that of the face down to a least one, shape (n_face,), owned.
+    times as much. `damping`: D, that of the face down to a least one, owned.
     """
 
     damping: Vector
@@ -207,14 +199,8 @@ class CoupledSystem:
 
     Newton's step tests with the face's own basis W = Z_s and moves the multiplier along Z = Z_u = Z_s +
     growth: the column of a normal multiplier includes the slipping friction μ ŵ. The adjoint swaps the two.
-
-    Attributes:
-        system: The symmetric system of the face: F and the preconditioner.
-        tested: W, shape (n_owned, n_face).
-        moving: Z, shape (n_owned, n_face).
-        curvature: κ, shape (n_face,).
-        oblique: Projector that preserves G Z y and ignores what rigid motions absorb.
-        damped: Preserves equilibrium where offsets are held in place; None where all entries share equally.
+    `tested`: W; `moving`: Z; `curvature`: κ; `damped`: preserves equilibrium where offsets are held in place;
+    None where all entries share equally.
     """
 
     system: FaceSystem
@@ -239,10 +225,9 @@ class CoupledSystem:
     ) -> CoupledSystem | None:
         """Join both bases; None where the face does not hold every body. Collective.
 
-        `tested`: W, shape (n_owned, n_face); `moving`: Z, shape (n_owned, n_face); `curvature`: κ, by default
-        that of the face; `whole`: whether both begin with all equality rows, see `CoarseSpace.restricted`;
-        `least_damping`: lower bound on D, so that motions that only offsets resist stay
-        distinct from unresisted ones.
+        `tested`: W; `moving`: Z; `curvature`: κ, by default that of the face; `whole`: whether both begin
+        with all equality rows, see `CoarseSpace.restricted`; `least_damping`: lower bound on D, so that
+        motions that only offsets resist stay distinct from unresisted ones.
         """
         known = whole and tested is system.face.restriction
         columns = system.coarse.matrix if known else coarse.columns(tested, whole=whole)
@@ -290,12 +275,7 @@ class CoupledSystem:
 
 @dataclass(frozen=True, eq=False)
 class CoupledFace:
-    """A Newton step with growing friction: λ = fixed + Z_u y.
-
-    Attributes:
-        coarse: Equilibrium of all multipliers, G λ = e.
-        fixed: The part of the multiplier that does not grow, owned.
-    """
+    """A Newton step with growing friction: λ = fixed + Z_u y."""
 
     coupled: CoupledSystem
     coarse: CoarseSpace

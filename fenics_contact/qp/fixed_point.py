@@ -73,11 +73,7 @@ class SlipBoundSequence:
         return self._stage >= len(self._damping.fractions)
 
     def advance(self, bound: Vector, image: Vector, residual: float) -> tuple[Vector, str]:
-        """Return the next slip bound and a note on the decision. Collective.
-
-        `bound`: Ψ of the last Tresca problem, shape (n_friction,), owned; `image`: the slip bound that
-        belongs to its solution, shape (n_friction,), owned.
-        """
+        """Return the next slip bound and a note on the decision. Collective."""
         self._bounds = [*self._bounds[1 - self._damping.memory :], bound]
         period, change = self._returned(image)
         self._returns = self._returns + 1 if period else 0

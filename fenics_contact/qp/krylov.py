@@ -30,11 +30,9 @@ class Stop(Enum):
 class FaceStep:
     """The result of an inner solver on a face.
 
-    Attributes:
-        step: δ on the face with G Z δ = 0, shape (n_face,), owned.
-        product: F Z δ, owned, updated by recursion.
-        residual: P_F (g + (Zᵀ F Z + κ) δ), shape (n_face,), owned, updated by recursion.
-        measure: Weighted norm of `residual`, the quantity compared with the tolerance.
+    `step`: δ on the face with G Z δ = 0, owned; `product`: F Z δ, owned, updated by recursion; `residual`:
+    P_F (g + (Zᵀ F Z + κ) δ), owned, updated by recursion; `measure`: weighted norm of `residual`, the
+    quantity compared with the tolerance.
     """
 
     step: Vector
@@ -115,13 +113,10 @@ def projected_cg(
     Each iteration applies F once, the preconditioner once, and combines its sums in three messages: the
     coarse right side and all conjugation coefficients of the new direction in the first, those of its product
     in the second, the norm of the residual in the third. Conjugation against all previous directions is two
-    matrix–vector products.
-
-    `gradient`: g = Zᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned; `weights`: positive
-    weights of the stopping norm ‖weights · P_F(g + A δ)‖, shape (n_face,), owned; `enough`: ends the
-    iteration before the tolerance is reached, asked every few iterations.
-
-    Returns the step and why the iteration ended; nothing is raised, the caller decides what a failure means.
+    matrix–vector products. Returns the step and why the iteration ended; nothing is raised, the caller
+    decides what a failure means. `gradient`: g = Zᵀ(F λ − d) + κ y at the starting point, owned; `weights`:
+    positive weights of the stopping norm ‖weights · P_F(g + A δ)‖, owned; `enough`: ends the iteration before
+    the tolerance is reached, asked every few iterations.
 
     References:
         C. Farhat, F.-X. Roux, A method of finite element tearing and interconnecting and its parallel
@@ -213,13 +208,11 @@ def projected_gmres(
 
     Right preconditioned, in the norm ‖weights · r‖ of the projected residual, which is minimised and compared
     with the tolerance. Without restart, but where memory is short and directions are stored in single
-    precision: there after some of them, and at each residual that their rounding would reach.
-
-    `gradient`: g = Wᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned; `weights`: positive
-    weights, shape (n_face,), owned; `enough`: ends the iteration before the tolerance is reached;
-    `restart_at`: residual at which a restart begins, relative to the one before; `longest`: directions.
-
-    Returns the step in face coordinates (the multiplier moves by Z δ) and why the iteration ended.
+    precision: there after some of them, and at each residual that their rounding would reach. Returns the
+    step in face coordinates (the multiplier moves by Z δ) and why the iteration ended. `gradient`: g = Wᵀ(F λ
+    − d) + κ y at the starting point, owned; `weights`: positive weights, owned; `enough`: ends the iteration
+    before the tolerance is reached; `restart_at`: residual at which a restart begins, relative to the one
+    before; `longest`: directions.
 
     References:
         Y. Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003), algorithms 6.9 and 9.5.

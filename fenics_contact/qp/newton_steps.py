@@ -69,10 +69,8 @@ def run_newton(method: NewtonMethod[State, Answer], state: State) -> Answer:
 class Forcing:
     """Forcing terms η, by choice 1 or 2 of Eisenstat and Walker.
 
-    Attributes:
-        largest: Largest tolerance relative to the residual.
-        loosest: Largest absolute tolerance.
-        tolerance: That of the whole solve: no face is solved much more accurately.
+    `largest`: largest tolerance relative to the residual; `loosest`: largest absolute tolerance; `tolerance`:
+    that of the whole solve: no face is solved much more accurately.
     """
 
     largest: float
@@ -123,7 +121,6 @@ def damp(
 
     Where the active set alternates between two faces the solution lies between them. The way to the right
     face may lead over a worse one: a full step is taken if it improves on either of the last two points.
-
     `earlier`: those of the last two points, None without; `fractions`: parts of the step that are tried where
     its end is worse; `shortest`: one more, for the neighbourhood of a solution.
     """
@@ -148,13 +145,10 @@ class Contradiction:
     """What rows demand of each other where B_Fᵀ N = 0: a node that sticks to a floor and touches a wall.
 
     There Nᵀr is the same for all multipliers of the face, and zero only where the rows agree. The dual
-    objective falls without end along −N Nᵀr: forces grow until a disc slips or a contact opens.
-
-    Attributes:
-        excess: The part of the residual on the face that no multiplier changes, shape (n_face,), owned.
-        direction: Change of the multiplier that lowers the objective and deforms nothing, owned.
-        group: Rows with the same number ≥ 0 are coupled, others are not; shape (n_owned,).
-        n_groups: Number of groups on all ranks.
+    objective falls without end along −N Nᵀr: forces grow until a disc slips or a contact opens. `excess`: the
+    part of the residual on the face that no multiplier changes, owned; `direction`: change of the multiplier
+    that lowers the objective and deforms nothing, owned; `group`: rows with the same number ≥ 0 are coupled,
+    others are not.
     """
 
     excess: Vector
@@ -242,16 +236,12 @@ def shorten(
 class Safeguards:
     """Safeguards that keep Newton's method from cycling.
 
-    Attributes:
-        shorten: Chooses a point of a step, given its ends and the residuals before it.
-        adapts_step: Whether the ρ of a disc whose friction force would turn by more than a right angle is
-            reduced: it was too large, unless springs prescribe it.
-        reduction: Factor on that ρ.
-        longest_cycle: The longest cycle of active sets that is recognised.
-        moves_held: Whether floating bodies are equilibrated also where the face holds them all.
-        balanced: Imbalance up to which an iterate counts as in equilibrium; steps from others are not cut.
-        stuck: Part of a step after which the next one is not cut on the same face.
-        rounded: Where products are in single precision, least tolerance of a face relative to the residual.
+    `adapts_step`: whether the ρ of a disc whose friction force would turn by more than a right angle is
+    reduced: it was too large, unless springs prescribe it; `reduction`: factor on that ρ; `moves_held`:
+    whether floating bodies are equilibrated also where the face holds them all; `balanced`: imbalance up to
+    which an iterate counts as in equilibrium; steps from others are not cut; `stuck`: part of a step after
+    which the next one is not cut on the same face; `rounded`: where products are in single precision, least
+    tolerance of a face relative to the residual.
     """
 
     shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped[Iterate]] = shorten
@@ -268,12 +258,9 @@ class Safeguards:
 class FaceState:
     """The data passed from one Newton step to the next.
 
-    Attributes:
-        step: ρ of the natural map, 0 on equality rows, owned.
-        mismatch: Difference of the last residual from the one that its face predicted, relative to the
-            residual before it.
-        before: Residuals before the last step, None before the first.
-        fraction: Part of the last step that was taken.
+    `step`: ρ of the natural map, 0 on equality rows, owned; `mismatch`: difference of the last residual from
+    the one that its face predicted, relative to the residual before it; `fraction`: part of the last step
+    that was taken.
     """
 
     iterate: Iterate
@@ -315,15 +302,8 @@ class _SolvedFace:
 class FaceSteps:
     """Newton's method on the faces of one problem: `init` makes the first state, `step` the following ones.
 
-    Attributes:
-        problem: The dual problem, or that of a proximal point.
-        operator: Its operator, counted.
-        forcing: How accurately faces are solved.
-        max_products: Largest number of F-products of the whole solve.
-        safeguards: Safeguards against cycling.
-        natural_step: ρ = 1/diag F, 0 on equality rows, owned.
-        systems: The linear systems of faces.
-        correction: Moves floating bodies into equilibrium.
+    `natural_step`: ρ = 1/diag F, 0 on equality rows, owned; `correction`: moves floating bodies into
+    equilibrium.
     """
 
     problem: DualProblem

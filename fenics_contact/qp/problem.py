@@ -62,10 +62,8 @@ class RowsOfFace(Protocol):
 class LeastSizes:
     """Sizes that residuals are relative to where those of the answer may vanish.
 
-    Attributes:
-        force: Of contact forces, [force].
-        gluing: Of the jumps of gluing rows that cancel, [length].
-        everything: Of all multipliers, [force].
+    `force`: of contact forces; `gluing`: of the jumps of gluing rows that cancel; `everything`: of all
+    multipliers.
     """
 
     force: float = 0.0
@@ -204,12 +202,8 @@ class Scaling:
     """Factors s of the multipliers, λ = s μ, that equalise their stiffness, and the coarse space of μ.
 
     The projector of the problem for μ is that of λ with P_Q = I − Q Gᵀ(G Q Gᵀ)⁻¹G, Q = diag(s²). Where the
-    coefficients jump, preconditioned projected conjugate gradients need such a Q to converge independently
-    of the jumps.
-
-    Attributes:
-        factor: s > 0, the same for all multipliers of one contact, owned, shape (size,).
-        coarse: G diag(s) with the right side e.
+    coefficients jump, preconditioned projected conjugate gradients need such a Q to converge independently of
+    the jumps. `factor`: s > 0, the same for all multipliers of one contact, owned.
 
     References:
         A. Klawonn, O. B. Widlund, FETI and Neumann-Neumann iterative substructuring methods: connections and

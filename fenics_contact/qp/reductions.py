@@ -12,10 +12,7 @@ Vector = npt.NDArray[np.float64]
 
 
 def global_sum(comm: MPI.Comm, *parts: npt.ArrayLike) -> Vector:
-    """Sum arrays over all ranks, joined in one message. Collective on ``comm``.
-
-    Returns the sums, flattened and concatenated in the order given, the same on every rank.
-    """
+    """Sum arrays over all ranks, joined in one message. Collective on ``comm``."""
     local = np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
     if comm.size == 1:
         return local

@@ -32,13 +32,8 @@ class ProximalPoint:
     In displacements this minimises a convex, continuously differentiable function, the potential energy with
     augmented Lagrangians of contact and friction, so that Newton's method with a line search converges
     globally and without cycles. Its face is Newton's of the problem with F + D, d + D λ̄ and ρ = 1/D; the
-    centre λ̄ then moves to the spring forces.
-
-    Attributes:
-        problem: The problem with springs: F + D, d + D λ̄, D instead of the diagonal of F, and Tresca's law
-            with the slip bound of the centre.
-        stiffness: 1/D in units of 1/diag F: the larger, the nearer to the problem without springs.
-        shift: D, 0 on equality rows, owned.
+    centre λ̄ then moves to the spring forces. `stiffness`: 1/D in units of 1/diag F: the larger, the nearer
+    to the problem without springs; `shift`: D, 0 on equality rows, owned.
 
     References:
         R. T. Rockafellar, Augmented Lagrangians and applications of the proximal point algorithm in convex
@@ -104,11 +99,10 @@ def descend(
 
     The potential energy of displacements u(λ, α) together with that of springs ρ in all contacts and discs is
     convex; its derivative along a step is the product of that of r with the force λ that deforms the bodies
-    less the force P_Λ(λ − ρ r) of the springs. Torn bodies are joined first, whatever the potential.
-
-    `steep`: the full step is taken if the slope at its end is below this fraction of the initial descent;
-    `level`: slope at which a minimum is accepted, relative to the initial one; `torn`: gluing residual above
-    which bodies are torn apart, and their potential is meaningless.
+    less the force P_Λ(λ − ρ r) of the springs. Torn bodies are joined first, whatever the potential. `steep`:
+    the full step is taken if the slope at its end is below this fraction of the initial descent; `level`:
+    slope at which a minimum is accepted, relative to the initial one; `torn`: gluing residual above which
+    bodies are torn apart, and their potential is meaningless.
     """
     slope = _slope(problem, before, after)
     first, last = slope(0.0), slope(1.0)
@@ -153,9 +147,7 @@ WITH_SPRINGS = Safeguards(shorten=descend, adapts_step=False, moves_held=False)
 class Rescued:
     """The result of a rescue.
 
-    Attributes:
-        iterate: The improved iterate, with its residuals under the law of the problem.
-        line: Its line of history, without number and reason.
+    `line`: its line of history, without number and reason.
     """
 
     iterate: Iterate
@@ -169,25 +161,15 @@ class Rescue:
     """Improves iterates that Newton's method cannot, with their slip bound temporarily fixed.
 
     By proximal points; by SMALSE, which solves no face, where bodies float and no preconditioner makes faces
-    cheap.
-
-    Attributes:
-        problem: The dual problem.
-        forcing: How accurately Newton's method solves its faces, and the tolerance of the solve.
-        max_products: Largest number of F-products of the whole solve.
-        smalse: Parameters of SMALSE.
-        reduction: A rescue aims at a residual smaller by this factor.
-        springs: First stiffness of the springs in units of 1/diag F: soft for Newton, stiff for the centre.
-        variety: Factors on that stiffness from the fifth rescue on, in turn: where F is singular, Newton's
-            method may lose the same way again what springs of one stiffness have gained.
-        few: If a centre takes no more steps than this, the springs of the next are stiffer: constant springs
-            move the centre by the same small fraction of its way to the solution each time.
-        stiffer: Factor on the springs then.
-        max_steps: Newton steps of a rescue by proximal points.
-        centred: The centre moves once the residual with springs is this small,
-        ahead: or this much smaller than that without.
-        face_forcing: Largest inner tolerance relative to the residual with springs,
-        face_loosest: and the largest absolute one.
+    cheap. `reduction`: A rescue aims at a residual smaller by this factor; `springs`: first stiffness of the
+    springs in units of 1/diag F: soft for Newton, stiff for the centre; `variety`: factors on that stiffness
+    from the fifth rescue on, in turn: where F is singular, Newton's method may lose the same way again what
+    springs of one stiffness have gained; `few`: if a centre takes no more steps than this, the springs of the
+    next are stiffer: constant springs move the centre by the same small fraction of its way to the solution
+    each time; `stiffer`: factor on the springs then; `max_steps`: Newton steps of a rescue by proximal
+    points; `centred`: the centre moves once the residual with springs is this small; `ahead`: or this much
+    smaller than that without; `face_forcing`: largest inner tolerance relative to the residual with springs;
+    `face_loosest`: and the largest absolute one.
     """
 
     problem: DualProblem

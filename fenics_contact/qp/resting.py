@@ -25,13 +25,9 @@ LEAST_FORCE = 1e-10
 class LooseMotions:
     """Motions of bodies that no force resists, but contact without a force might.
 
-    Attributes:
-        motions: Orthonormal coefficients, shape (m, k), replicated.
-        rows: By how much each closes the contact rows without a force, of all ranks, shape (n, k), [length].
-        distance: Gaps, and slips as they are in tangential rows, shape (n,), [length].
-        given: The same before anything moves, shape (n,), [length].
-        normal: Which of these rows are normal ones, shape (n,).
-        size: Of distances, [length].
+    `motions`: orthonormal coefficients, shape (m, k), replicated; `rows`: by how much each closes the contact
+    rows without a force, of all ranks, shape (n, k), [length]; `distance`: gaps, and slips as they are in
+    tangential rows; `given`: the same before anything moves.
     """
 
     motions: Vector

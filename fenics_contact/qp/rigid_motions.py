@@ -30,13 +30,9 @@ class RigidMotionCorrection:
     Newton's method with the bound that follows the trial normal force comes first. Where it does not halve
     the imbalance in every step, the bound is frozen and updated alternately; then β minimises a convex
     potential, for friction the sum of Huber functions of the slips, with global convergence. Where no motion
-    balances the load under these bounds, bodies move as on linear springs.
-
-    Attributes:
-        problem: The dual problem, whose law is that of the trial forces.
-        motions: N, orthonormal motions of bodies that no equality row holds, shape (m, k), replicated.
-        rows: Gᵀ N without rounding, shape (n_owned, k).
-        unresisted: Motions that contact resists less than this, relative to the others, are left unchanged.
+    balances the load under these bounds, bodies move as on linear springs. `motions`: N, orthonormal motions
+    of bodies that no equality row holds, replicated; `rows`: Gᵀ N without rounding; `unresisted`: motions
+    that contact resists less than this, relative to the others, are left unchanged.
     """
 
     problem: DualProblem

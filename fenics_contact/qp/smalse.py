@@ -31,10 +31,8 @@ from fenics_contact.qp.solution import (
 class Mpgp:
     """Parameters of the method.
 
-    Attributes:
-        expansion: Fixed step ᾱ of the gradient projection times ‖A‖, below 2.
-        proportioning: Γ; active constraints are released once the chopped gradient exceeds Γ times the free
-            one.
+    `expansion`: fixed step ᾱ of the gradient projection times ‖A‖, below 2; `proportioning`: Γ; active
+    constraints are released once the chopped gradient exceeds Γ times the free one.
     """
 
     expansion: float = 1.9
@@ -45,10 +43,7 @@ class Mpgp:
 class BoundedQuadratic:
     """½ xᵀA x − bᵀx over a feasible set.
 
-    Attributes:
-        comm: Communicator of the ranks.
-        operator: A, symmetric positive semidefinite, owned to owned, collective.
-        rhs: b, owned.
+    `operator`: A, symmetric positive semidefinite, owned to owned, collective; `rhs`: b, owned.
     """
 
     comm: MPI.Comm
@@ -70,10 +65,8 @@ class BoundedQuadratic:
 class BoundedMinimum:
     """The result of MPGP.
 
-    Attributes:
-        x: The iterate, in the set, owned.
-        gradient: A x − b there, owned, updated by recursion within a sequence of CG steps.
-        reached: Whether the projected gradient met the target.
+    `gradient`: A x − b there, owned, updated by recursion within a sequence of CG steps; `reached`: whether
+    the projected gradient met the target.
     """
 
     x: Vector
@@ -103,9 +96,9 @@ def minimise(
     """Minimise a quadratic over bounds and discs by MPGP. Collective.
 
     While the chopped gradient β is dominated by the free gradient φ, the iteration moves by conjugate
-    gradients on the free variables; a CG step that would leave the set is cut at the boundary and
-    followed by a gradient projection (expansion). Otherwise one gradient projection releases constraints
-    (proportioning). The reduced gradients of the test are those of a step of length ᾱ.
+    gradients on the free variables; a CG step that would leave the set is cut at the boundary and followed by
+    a gradient projection (expansion). Otherwise one gradient projection releases constraints (proportioning).
+    The reduced gradients of the test are those of a step of length ᾱ.
 
     References:
         Z. Dostál, T. Kozubek, Math. Program. 135 (2012), algorithm MPGP.
@@ -160,11 +153,9 @@ def largest_eigenvalue(
 ) -> float:
     """Return an upper estimate of ‖A‖ by Lanczos with full reorthogonalisation. Collective.
 
-    The largest Ritz value θ is a lower bound; θ plus the residual norm of its Ritz vector bounds from
-    above the eigenvalue it belongs to. Iterated until the two agree to ``accuracy``; the upper one is
-    returned, because a fixed step length 1.9/‖A‖ must not be too long.
-
-    Returns the estimate, the same on every rank; 0 for an operator that maps the start to zero.
+    The largest Ritz value θ is a lower bound; θ plus the residual norm of its Ritz vector bounds from above
+    the eigenvalue it belongs to. Iterated until the two agree to ``accuracy``; the upper one is returned,
+    because a fixed step length 1.9/‖A‖ must not be too long.
     """
     start = np.random.default_rng(comm.rank).standard_normal(size)
     basis: list[Vector] = [np.asarray(start / (_norm(comm, start) or 1.0), dtype=np.float64)]
@@ -344,10 +335,8 @@ class Smalse:
 class SmalseState:
     """The multiplier after an outer iteration, with residuals that cost no further product.
 
-    Attributes:
-        multiplier: λ in Λ(Ψ), in equilibrium up to the penalty, owned.
-        residual: ‖PFP‖ times the gradient of the Lagrangian: F λ − d − Gᵀα up to F times the equilibrium
-            error, owned.
+    `residual`: ‖PFP‖ times the gradient of the Lagrangian: F λ − d − Gᵀα up to F times the equilibrium error,
+    owned.
     """
 
     multiplier: Vector

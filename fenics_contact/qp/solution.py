@@ -183,17 +183,9 @@ def _ratio(value: float, scale: float) -> float:
 class SolverStep:
     """One line of a solver's history; counts and residuals are global.
 
-    Attributes:
-        method: Which algorithm took the step.
-        iteration: Number of the step within the solve, from 0.
-        products: F-products up to and including this step.
-        residuals: Residuals after the step.
-        closed: Closed contacts.
-        stick: Sticking discs.
-        slip: Slipping discs.
-        note: The solver's decision in words; empty for an ordinary step.
-        outer: Number of the solve that it belongs to, from 0: a Tresca problem of the Coulomb fixed point, or
-            a round with a smaller tolerance.
+    `products`: F-products up to and including this step; `note`: the solver's decision in words; empty for an
+    ordinary step; `outer`: number of the solve that it belongs to, from 0: a Tresca problem of the Coulomb
+    fixed point, or a round with a smaller tolerance.
     """
 
     method: str
@@ -230,9 +222,8 @@ def continued(history: Sequence[SolverStep], steps: Sequence[SolverStep], produc
 class SmalseMemory:
     """Estimates of SMALSE that it can reuse for a neighbouring problem.
 
-    Attributes:
-        norm: Upper estimate of ‖PFP‖.
-        balance: M, the ratio of projected gradient to equilibrium error at which inner iterations stop.
+    `norm`: upper estimate of ‖PFP‖; `balance`: M, the ratio of projected gradient to equilibrium error at
+    which inner iterations stop.
     """
 
     norm: float
@@ -242,16 +233,7 @@ class SmalseMemory:
 @displayed
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solution:
-    """A multiplier that satisfies every residual to the tolerance, and how it was found.
-
-    Attributes:
-        multiplier: λ, owned.
-        residuals: The residuals.
-        iterations: Outer steps of the solver.
-        products: F-products of this solve, for all purposes.
-        history: One record per step, oldest first.
-        reason: Why the solver stopped, in words.
-    """
+    """A multiplier that satisfies every residual to the tolerance, and how it was found."""
 
     multiplier: Vector
     residuals: Residuals
@@ -304,11 +286,8 @@ class DualSolution(Solution):
 class Iterate:
     """An iterate of the multiplier.
 
-    Attributes:
-        multiplier: λ, owned.
-        product: F λ, owned, recomputed or updated by recursion.
-        residual: r = F λ − d − Gᵀα, owned, with the α of the solver.
-        residuals: Residuals of λ.
+    `product`: F λ, owned, recomputed or updated by recursion; `residual`: r = F λ − d − Gᵀα, owned, with the
+    α of the solver.
     """
 
     multiplier: Vector
@@ -347,8 +326,7 @@ class Start:
 class StoppedError(ConvergenceError):
     """A dual solver stopped before its tolerance was met.
 
-    Attributes:
-        best: The iterate with the least residual, from which another solver may go on.
+    `best`: the iterate with the least residual, from which another solver may go on.
     """
 
     def __init__(self, message: str, history: Sequence[SolverStep], best: Iterate) -> None:
@@ -370,8 +348,8 @@ def iterate_fitted(
     """Return the iterate with α = (G_F G_Fᵀ)⁻¹ G_F (F λ − d)_F of the rows that are free by λ. Collective.
 
     Free are the gluing rows, contacts with λ_N > 0, discs inside their bound by the relative ``margin``, and
-    the tangents of the others. There r should vanish; open rows have gaps and slipping ones slip, which
-    must not enter the fit.
+    the tangents of the others. There r should vanish; open rows have gaps and slipping ones slip, which must
+    not enter the fit.
     """
     bound = (1.0 - margin) * problem.law.bound(multiplier)
     step = contact_step(problem.layout, problem.diagonal)
@@ -419,13 +397,7 @@ def apply_unless_zero(problem: DualProblem, operator: Operator, x: Vector) -> Ve
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """A multiplier whose α and residuals were recomputed from its exact product.
-
-    Attributes:
-        problem: The dual problem.
-        iterate: The multiplier.
-        alpha: α, shape (m,), replicated.
-    """
+    """A multiplier whose α and residuals were recomputed from its exact product."""
 
     problem: DualProblem
     iterate: Iterate

@@ -53,10 +53,10 @@ def find_equilibrium(
 ) -> Equilibrium:
     """Compute an admissible multiplier that balances the load, without any F-product. Collective.
 
-    Minimises ½‖Q z − λ₀‖² over the admissible set by accelerated projected gradients, Q = I − P. At
-    distance g = Q z − λ₀ with optimality error s = z − P_Λ(z − g), any equilibrium y satisfies ‖g‖² ≤ ‖s‖(‖y
-    − z‖ + ‖g‖). Once that would need a force ``largest_force`` times the load's, none exists: a thin plate
-    clamped at one edge needs forces as many times the load as its length is times its thickness.
+    Minimises ½‖Q z − λ₀‖² over the admissible set by accelerated projected gradients, Q = I − P. At distance
+    g = Q z − λ₀ with optimality error s = z − P_Λ(z − g), any equilibrium y satisfies ‖g‖² ≤ ‖s‖(‖y − z‖ +
+    ‖g‖). Once that would need a force ``largest_force`` times the load's, none exists: a thin plate clamped
+    at one edge needs forces as many times the load as its length is times its thickness.
     """
     coarse, law = problem.coarse, problem.law
     target = coarse.particular()
@@ -101,8 +101,6 @@ def may_grip(problem: DualProblem, multiplier: Vector) -> bool:
     Without friction that grows with the normal force, forces without a load are unique. With it they may
     remain, as in a wedge or a taper, unless it is proven that no admissible ones balance each other, those of
     a block on its floor for one.
-
-    `multiplier`: forces of the last load, owned; only the sum of the normal ones counts.
     """
     coarse, layout, comm = problem.coarse, problem.layout, problem.comm
     if global_max(comm, float(problem.law.grows)) == 0.0:
