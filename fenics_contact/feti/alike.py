@@ -27,11 +27,8 @@ from fenics_contact.feti.subdomain import LocalOperator, Subdomain
 class Motion:
     """How the dofs of a subdomain lie on those of the first of its kind, u_first = P u.
 
-    Attributes:
-        place: Dof of the subdomain on each of the first one's, shape (n,).
-        sign: Factor of each, 1 or −1, shape (n,).
-        turn: Q, which also turns the components of each node, shape (dim, dim); None: the signs suffice, as
-            the axes lie on each other.
+    `place`: dof of the subdomain on each of the first one's; `sign`: factor of each, 1 or −1; `turn`: Q,
+    which also turns the components of each node; None: the signs suffice, as the axes lie on each other.
     """
 
     place: np.ndarray
@@ -62,11 +59,7 @@ class Motion:
 class Kind:
     """A kind of subdomains, represented by its first one, and what is compared of others with it.
 
-    Attributes:
-        subdomain: The first one.
-        interface: Its interface dofs, ascending, (n_b,).
-        key: Counts that agree where subdomains are alike.
-        operator: Its factors; None until they are made.
+    `key`: counts that agree where subdomains are alike; `operator`: its factors; None until they are made.
     """
 
     def __init__(self, subdomain: Subdomain, interface: np.ndarray) -> None:
@@ -151,12 +144,11 @@ class Kind:
 class Agreement:
     """How closely subdomains agree that are alike.
 
-    Attributes:
-        matrix: Difference of stiffnesses, relative to their largest entry. Those of equal pieces of one body
-            differ by 1e-15, of turned ones by some 1e-14.
-        shape: Difference of coordinates, relative to the size, up to which nodes are tried as the same.
-        marks: Difference of the invariants of a node up to which it is tried as the same.
-        motions: Number of rotations and mirrors that are tried for one pair; a cube has 48 of its own.
+    `matrix`: difference of stiffnesses, relative to their largest entry. Those of equal pieces of one body
+    differ by 1e-15, of turned ones by some 1e-14; `shape`: difference of coordinates, relative to the size,
+    up to which nodes are tried as the same; `marks`: difference of the invariants of a node up to which it is
+    tried as the same; `motions`: number of rotations and mirrors that are tried for one pair; a cube has 48
+    of its own.
     """
 
     matrix: float = 1e-12
@@ -166,11 +158,7 @@ class Agreement:
 
 
 class Kinds:
-    """Kinds of subdomains.
-
-    Attributes:
-        all: The kinds in the order in which they were found.
-    """
+    """Kinds of subdomains."""
 
     def __init__(self, agreement: Agreement | None = None) -> None:
         """Start empty."""

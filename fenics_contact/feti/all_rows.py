@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 class RowCompliance:
     """C(λ) of this rank's rows.
 
-    Attributes:
-        soft: Positions of rows of equality with a compliance among the owned ones, shape (k,).
-        constant: That of each of these, C(λ) = C λ, shape (k,), [length / force].
-        contact: That of contact rows, see `qp`; None where none has any.
+    `soft`: positions of rows of equality with a compliance among the owned ones; `constant`: that of each of
+    these, C(λ) = C λ; `contact`: that of contact rows, see `qp`; None where none has any.
     """
 
     soft: np.ndarray
@@ -55,12 +53,7 @@ Kind = TypeVar("Kind", bound=RowGroup)
 class RowGroups:
     """All groups of a system in the order of their rows.
 
-    Attributes:
-        glued: The rows that glue subdomains and fix them at supports.
-        joints: What joins bodies, in the order of `feti.joints`.
-        normal: Those of contact along the normals, one for each contact point.
-        slips: Those along the tangents, dim − 1 for each point with friction.
-        further: Rows that a linearisation adds.
+    `joints`: what joins bodies, in the order of `feti.joints`; `further`: rows that a linearisation adds.
     """
 
     glued: Glued

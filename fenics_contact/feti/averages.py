@@ -12,12 +12,8 @@ from fenics_contact.feti.decomposition import Decomposition
 def nodal_mean(decomposition: Decomposition, displacement: np.ndarray) -> np.ndarray:
     """Return the mean over all copies of each node, each weighted by its stiffness. Collective.
 
-    Copies on all ranks count, so that the mean does not depend on the distribution.
-
-    `displacement`: this rank's torn displacement, shape (torn_size,), [length].
-
-    Returns displacement of the nodes of all bodies, NaN on nodes that this rank does not hold, shape
-    (n_nodes, dim), [length].
+    Copies on all ranks count, so that the mean does not depend on the distribution. Returns displacement of
+    the nodes of all bodies, NaN on nodes that this rank does not hold, shape (n_nodes, dim), [length].
     """
     tearing = decomposition.tearing
     here, columns = decomposition.held
@@ -31,13 +27,7 @@ def nodal_mean(decomposition: Decomposition, displacement: np.ndarray) -> np.nda
 
 
 def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return the same mean of a torn field at some nodes, on all ranks. Collective.
-
-    `field`: this rank's part of the field, shape (torn_size,); `nodes`: nodes among those of all bodies,
-    shape (n,).
-
-    The result has shape (n, dim), replicated.
-    """
+    """Return the same mean of a torn field at some nodes, on all ranks. Collective."""
     tearing = decomposition.tearing
     place, copy, block = decomposition.copies_here(nodes)
     total = np.zeros((len(nodes), tearing.components))
@@ -46,13 +36,7 @@ def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.nda
 
 
 def nodal_mean_transposed(decomposition: Decomposition, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the torn field that does the same work on a torn field as values at nodes do on its means.
-
-    `nodes`: different nodes among those of all bodies, shape (n,); `values`: values at these nodes, shape (n,
-    dim).
-
-    Returns this rank's part of the field, shape (torn_size,).
-    """
+    """Return the torn field that does the same work on a torn field as values at nodes do on its means."""
     tearing = decomposition.tearing
     place, copy, block = decomposition.copies_here(nodes)
     result = np.zeros((decomposition.torn_size // tearing.components, tearing.components))
@@ -69,12 +53,7 @@ def at_copies(decomposition: Decomposition, values: np.ndarray) -> np.ndarray:
 
 
 def nodal_sum(decomposition: Decomposition, force: np.ndarray) -> np.ndarray:
-    """Return the sum of a torn force over all copies of each node, on all ranks. Collective.
-
-    `force`: this rank's torn force, shape (torn_size,), [force].
-
-    Returns forces on the nodes of all bodies, shape (n_nodes, dim), replicated, [force].
-    """
+    """Return the sum of a torn force over all copies of each node, on all ranks. Collective."""
     tearing = decomposition.tearing
     here, block = decomposition.held
     total = np.zeros((tearing.n_nodes, tearing.components))
@@ -86,11 +65,7 @@ class Sharing:
     """Items of which more than one rank may hold a part, identified by global numbers."""
 
     def __init__(self, comm: MPI.Comm, keys: np.ndarray, mine: np.ndarray) -> None:
-        """Determine which ranks share which items. Collective on ``comm``.
-
-        `keys`: number of each item that this rank holds, ascending, shape (n,); `mine`: positions in ``keys``
-        of those that other ranks may hold as well.
-        """
+        """Determine which ranks share which items. Collective on ``comm``."""
         self.comm = comm
         every = comm.allgather(keys[mine]) if comm.size > 1 else [keys[mine]]
         self._with: list[np.ndarray] = []
@@ -103,8 +78,6 @@ class Sharing:
         """Return values in which the rows of shared items are the sums over all ranks. Collective.
 
         The ranks that share an item obtain bitwise equal sums.
-
-        `values`: this rank's parts, shape (n, ...).
         """
         if self.comm.size == 1:
             return values

@@ -80,11 +80,9 @@ class CompactOperator:
 
         u ← u + (L Lᵀ)⁻¹ (f − (S + ρ Q Qᵀ) u),
 
-    with S by the sparse stiffness and the factor of its inside, which are made again for it.
-
-    Attributes:
-        pays_from: Number of subdomains from which one product of matrices is faster.
-        contracts: Whether refinement converges; not where S is too ill-conditioned for single precision.
+    with S by the sparse stiffness and the factor of its inside, which are made again for it. `pays_from`:
+    number of subdomains from which one product of matrices is faster; `contracts`: whether refinement
+    converges; not where S is too ill-conditioned for single precision.
     """
 
     pays_from = Rates.whole  # what the plan counts with
@@ -219,8 +217,6 @@ class CompactOperator:
         """Return bᵀ (K⁺)_bb b for each row b of a matrix with interface columns, in single precision.
 
         As ‖L⁻¹ b‖².
-
-        `at_once`: rows that are solved for together.
         """
         lower = self._lower if self._lower.ndim == 2 else lapack.stpttr(self._size, self._lower, uplo="L")[0]
         flexibility = np.empty(rows.shape[0])

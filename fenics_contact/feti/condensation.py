@@ -23,10 +23,7 @@ class Condensation:
     """
 
     def __init__(self, pattern: sp.csr_matrix, interface: np.ndarray) -> None:
-        """Prepare for symmetric matrices with the sparsity of ``pattern``.
-
-        `pattern`: any matrix with the pattern, shape (n, n); `interface`: the dofs b, shape (n_b,).
-        """
+        """Prepare for symmetric matrices with the sparsity of ``pattern``."""
         self._size, self._interface = len(interface), interface
         self._structure = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
         self._matrix = symmetric_matrix(pattern)
@@ -103,10 +100,8 @@ class Condensations:
 class RegularFactor(NamedTuple):
     """The lower Cholesky factor of S + ρ Q Qᵀ.
 
-    Attributes:
-        modes: Q, orthonormal.
-        rho: ρ.
-        least: About the least eigenvalue of the matrix scaled to a diagonal of ones.
+    `modes`: Q, orthonormal; `rho`: ρ; `least`: about the least eigenvalue of the matrix scaled to a diagonal
+    of ones.
     """
 
     lower: np.ndarray
@@ -122,13 +117,9 @@ def regular_factor(
 
     Q is the trace of the kernel on the interface, orthonormal, shape (n_b, n_modes). ρ is the largest
     diagonal entry of S. Where that is rounding compared with the typical stiffness, every displacement of the
-    interface is a rigid motion, as in a statically determinate body.
-
-    `rounded`: least eigenvalue of the scaled matrix that is rounding. A motion without energy has 1e-17 to
-    2e-15, whatever the nodes that it moves; cells of aspect 1000 have 1e-14.
-
-    Raises:
-        InvalidInputError: If S has another kernel than that given.
+    interface is a rigid motion, as in a statically determinate body. `rounded`: least eigenvalue of the
+    scaled matrix that is rounding. A motion without energy has 1e-17 to 2e-15, whatever the nodes that it
+    moves; cells of aspect 1000 have 1e-14.
     """
     modes, _ = np.linalg.qr(kernel)
     largest = schur.diagonal().max()

@@ -38,17 +38,11 @@ _LOG = logging.getLogger(__name__)
 class ConstraintRows(Joint):
     """Rows of linear constraints.
 
-    Attributes:
-        constraints: The constraints, for names.
-        equations: A, all equations of all constraints, shape (n_equations, n_nodes · components).
-        first: First equation of each constraint and the total, shape (n_constraints + 1,).
-        kept: S T, shape (n_rows, n_equations), of the independent rows.
-        lost: T on equations that supports determine or that depend on others, shape (n_lost, n_equations).
-        dependence: What of each lost one the rows make, shape (n_lost, n_rows).
-        free: S T A P, shape (n_rows, n_nodes · components).
-        components: Displacement components of a node.
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, components).
-        axes: Axes of nodes along which supports prescribe components; None: the coordinates' everywhere.
+    `equations`: A, all equations of all constraints; `kept`: S T, shape (n_rows, n_equations), of the
+    independent rows; `lost`: T on equations that supports determine or that depend on others, shape (n_lost,
+    n_equations); `dependence`: what of each lost one the rows make, shape (n_lost, n_rows); `free`: S T A P,
+    shape (n_rows, n_nodes · components); `axes`: axes of nodes along which supports prescribe components;
+    None: the coordinates' everywhere.
     """
 
     constraints: Sequence[LinearConstraint]
@@ -142,10 +136,7 @@ class ConstraintRows(Joint):
         return np.asarray(self.whole @ field.ravel())
 
     def of_supports(self, prescribed: np.ndarray) -> np.ndarray:
-        """Return the contribution of prescribed displacements to each row, shape (n_rows,), [length].
-
-        `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
-        """
+        """Return the contribution of prescribed displacements to each row, shape (n_rows,), [length]."""
         return self.measured(self.moved(prescribed))
 
     def moved(self, prescribed: np.ndarray) -> np.ndarray:
@@ -176,8 +167,7 @@ class ConstraintRows(Joint):
     def check(self, scene: Scene, prescribed: np.ndarray, moving: sp.csr_matrix, near: float = 1e-6) -> None:
         """Reject equations that contradict others or supports.
 
-        `moving`: free motions of rigid surfaces on nodes, shape (n_nodes · components, n); `near`: of values,
-        relative to the largest.
+        `moving`: free motions of rigid surfaces on nodes; `near`: of values, relative to the largest.
         """
         if not self.left_out:
             return
@@ -306,8 +296,6 @@ def independent_rows(
 
     `regular`: added to the diagonal of the Gram matrix; `least`: pivot, the squared distance of a row from
     those before it, below which it depends on them; `at_once`: rows that are solved for together, dense.
-
-    Returns shape (n,) and (n_dependent, n_independent).
     """
     count = matrix.shape[0]
     kept, gram = np.ones(count, dtype=bool), (matrix @ matrix.T).tocsr()

@@ -25,13 +25,9 @@ REGULARISATION = 1e-4
 class _Holder:
     """The way from the ranks that own rows of contacts and ties to the one that holds their matrix, and back.
 
-    Attributes:
-        comm: Communicator.
-        rank: The rank that holds the matrix: the one that owns most of the rows.
-        owned: Positions of this rank's rows in its owned vectors.
-        place: Their numbers among all these rows.
-        order: On the holder numbers of all rows, rank by rank, shape (n_rows,).
-        counts: Rows of each rank.
+    `rank`: the rank that holds the matrix: the one that owns most of the rows; `owned`: positions of this
+    rank's rows in its owned vectors; `place`: their numbers among all these rows; `order`: on the holder
+    numbers of all rows, rank by rank.
     """
 
     comm: MPI.Comm
@@ -100,9 +96,7 @@ class ContactBlock:
     ) -> None:
         """Take the matrix, or its part on the columns of a basis, shape (n_rows, n_face).
 
-        Both are empty on other ranks than the holder.
-
-        `soft`: marks of rows that give way, shape (n_rows,); None: none do.
+        Both are empty on other ranks than the holder. `soft`: marks of rows that give way; None: none do.
         """
         self._holder, self._gram, self._basis, self._soft = holder, gram, basis, soft
         matrix = gram if basis is None else (basis.T @ gram @ basis).tocsr()
@@ -224,7 +218,7 @@ class ContactBlock:
 def _regularised(matrix: sp.csr_matrix, sizes: np.ndarray) -> Factor:
     """Factor A + ε D; rows that supports alone determine are empty and become those of the identity.
 
-    `sizes`: D, at least the diagonal of A, shape (n,).
+    `sizes`: D, at least the diagonal of A.
     """
     share = np.where(sizes > 0.0, REGULARISATION * sizes, 1.0)
     return Factor((matrix + sp.diags(share)).tocsr())
@@ -235,12 +229,9 @@ def _dependent_part(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Return z = D N (Nᵀ D N)⁻¹ Nᵀ x with A N = 0, D⁻¹ z, and coupled rows; None for zero.
 
-    T = ε D (A + ε D)⁻¹ keeps D N and multiplies the rest by ε / (ε + its eigenvalues).
-
-    `matrix`: A, positive semidefinite, shape (n, n); `right`: x, shape (n,); `diagonal`: D, shape (n,).
-
-    Returns both vectors, shape (n,), and the number of the block of A that a row belongs to, −1 where z is
-    zero.
+    T = ε D (A + ε D)⁻¹ keeps D N and multiplies the rest by ε / (ε + its eigenvalues). Returns both vectors,
+    shape (n,), and the number of the block of A that a row belongs to, −1 where z is zero. `matrix`: A,
+    positive semidefinite; `right`: x; `diagonal`: D.
     """
     left = np.where(diagonal > 0.0, right, 0.0)
     least, force = ROUNDING * np.abs(left).max(), np.zeros(len(left))

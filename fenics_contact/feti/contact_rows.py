@@ -34,10 +34,7 @@ if TYPE_CHECKING:
 class Relations(RowGroup):
     """The relative displacement that each row measures: d·(u_slave − Σ w_j u_master,j).
 
-    Attributes:
-        which: Point of each row, shape (n_rows,).
-        directions: d of each row, shape (n_rows, dim).
-        axes: Axes of nodes along which supports prescribe components.
+    `which`: point of each row; `directions`: d of each row.
     """
 
     points: ContactPoints
@@ -60,10 +57,7 @@ class Relations(RowGroup):
         return np.einsum("rd,rd->r", self.directions, self.points.relative(field)[self.which])
 
     def of_supports(self, prescribed: np.ndarray) -> np.ndarray:
-        """Return the contribution of prescribed displacements to each row, shape (n_rows,), [length].
-
-        `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
-        """
+        """Return the contribution of prescribed displacements to each row, shape (n_rows,), [length]."""
         known = np.nan_to_num(prescribed)
         along = self.measured(self.axes.to_global(known))
         # What is left of motions that cancel is none: slip along it would have friction.
@@ -85,8 +79,6 @@ class Relations(RowGroup):
         The displacement of a node is the mean of its copies, weighted as the gluing rows are: that makes
         these rows orthogonal to them. Prescribed components are known: kept, they would couple these rows to
         those of the supports, and make them redundant where supports hold both surfaces.
-
-        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
         """
         if self.count == 0:
             none = np.zeros(0, dtype=np.int64)
@@ -111,9 +103,7 @@ def on_copies(
 ) -> Rows:
     """Return rows on nodal displacements, the means of copies weighted by stiffness, as rows of B.
 
-    `row`: row of each entry, shape (n_entries,); `node`: its node, shape (n_entries,); `component`: its
-    component, shape (n_entries,); `value`: its value, shape (n_entries,); `slaves`: for each row a node whose
-    rank owns it, shape (n_rows,).
+    `slaves`: for each row a node whose rank owns it.
     """
     entry, copy = tearing.copies_of(node)
     owner = tearing.subdomain_rank[tearing.copy_subdomain[tearing.first_copy[slaves]]]
@@ -125,8 +115,7 @@ def on_copies(
 class NormalRows(Relations):
     """Rows −n·(u_slave − u_master) ≤ gap, one for each contact point.
 
-    Attributes:
-        closures: Closures of the contact points under their forces, replicated; None where contact is exact.
+    `closures`: closures of the contact points under their forces, replicated; None where contact is exact.
     """
 
     closures: Closures | None = field(default=None, kw_only=True)
@@ -165,15 +154,9 @@ class NormalRows(Relations):
 class TangentialRows(Relations):
     """The slip t_a·(u_slave − u_master): dim − 1 consecutive rows for each frictional point.
 
-    Attributes:
-        resting: Marks of rows along which supports prescribe no slip, shape (n_rows,).
-        frictional: Numbers of the contact points with friction, replicated, shape (n_friction,).
-        coefficient: μ of each of these (zero under Tresca), replicated, shape (n_friction,).
-        tresca_bound: Fixed slip bound of each, replicated, shape (n_friction,), [force].
-        elastic_slip: Slip of sticking points per friction force, replicated, shape (n_friction,), [length /
-            force].
-        strengths: Slip bounds with limits or on curves in place of μ λ_N, whose μ is then the largest ratio,
-            replicated; None where there are none.
+    `resting`: marks of rows along which supports prescribe no slip; `elastic_slip`: slip of sticking points
+    per friction force, replicated; `strengths`: slip bounds with limits or on curves in place of μ λ_N, whose
+    μ is then the largest ratio, replicated; None where there are none.
     """
 
     from_before = True
@@ -190,9 +173,7 @@ class TangentialRows(Relations):
 
         With rollers on both sides, the free part of a tangent is parallel to that of the normal: along it a
         closed point cannot slip, and an open one opens. Such a row is left to the normal one unless it has
-        the larger free part, or supports drive the point along it: then it slips.
-
-        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `parallel`: directions
+        the larger free part, or supports drive the point along it: then it slips. `parallel`: directions
         count as parallel if their sine is below this.
         """
         free = FreeSpaces.of(self.points, fixed, self.axes)
@@ -221,11 +202,7 @@ class TangentialRows(Relations):
         comm: MPI.Comm,
         axes: LocalAxes = NO_AXES,
     ) -> TangentialRows:
-        """Return those of the contact points of a scene. Collective on ``comm``.
-
-        `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim), along their
-        `axes`.
-        """
+        """Return those of the contact points of a scene. Collective on ``comm``."""
         has_friction, coefficient, bound, strengths = friction_data(scene, points, comm)
         frictional, dim = np.flatnonzero(has_friction), points.normal.shape[1]
         which, directions = np.repeat(frictional, dim - 1), points.tangents[frictional].reshape(-1, dim)

@@ -38,15 +38,8 @@ class Tearing(NodeNumbers):
     """The subdomains of the bodies of a scene, and the rank that owns each.
 
     Replicated on all ranks. Subdomains, like nodes, are numbered consecutively, body after body. A *copy* is
-    a pair (node, subdomain); copies are sorted by node, then by subdomain.
-
-    Attributes:
-        components: Displacement components of a node, the dofs of a copy.
-        subdomain_offset: First subdomain of each body and the total, shape (n_bodies + 1,).
-        subdomain_rank: Owner of each subdomain, shape (n_subdomains,).
-        first_copy: First copy of each node and the total, shape (n_nodes + 1,).
-        copy_subdomain: Subdomain of each copy, shape (n_copies,).
-        copy_stiffness: Typical stiffness at each copy, the largest being one, shape (n_copies,).
+    a pair (node, subdomain); copies are sorted by node, then by subdomain. `first_copy`: first copy of each
+    node and the total; `copy_stiffness`: typical stiffness at each copy, the largest being one.
     """
 
     components: int
@@ -96,8 +89,7 @@ def tear(
 ) -> Tearing:
     """Cut the bodies along a partition of their cells and distribute the subdomains over ranks.
 
-    `ranks`: number of ranks; each has about the same work, of every body consecutive subdomains; `stiffness`:
-    body name -> typical nodal stiffness of every cell, shape (n_cells,), [force / length].
+    `stiffness`: body name -> typical nodal stiffness of every cell.
     """
     numbers = NodeNumbers.of(scene)
     names, node_offset = numbers.body_names, numbers.node_offset
@@ -250,11 +242,7 @@ def weighted_helmert(stiffness: np.ndarray) -> np.ndarray:
     """Return rows of unit length that vanish on equal copies and are orthogonal in the inner product D⁻¹.
 
     Row k is the difference between the stiffness-weighted mean of the first k copies and the next one; with
-    equal stiffnesses these are the rows of a Helmert matrix.
-
-    `stiffness`: D of the copies of each node, shape (n, m).
-
-    The result has shape (n, m − 1, m).
+    equal stiffnesses these are the rows of a Helmert matrix. `stiffness`: D of the copies of each node.
     """
     count, copies = stiffness.shape
     rows = np.zeros((count, copies - 1, copies))
@@ -268,12 +256,9 @@ def weighted_helmert(stiffness: np.ndarray) -> np.ndarray:
 class GluingRows:
     """The equality rows that glue torn bodies together and fix them at their supports.
 
-    Attributes:
-        rows: The rows, with their entries on this rank's copies; their right side is filled from the supports
-            of a load, see `right_side`.
-        dof: Node and component that each row belongs to, as node · dim + component, shape (n_rows,).
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-        axes: Axes of nodes along which the components are.
+    `rows`: the rows, with their entries on this rank's copies; their right side is filled from the supports
+    of a load, see `right_side`; `dof`: node and component that each row belongs to, as node · dim +
+    component.
     """
 
     rows: Rows
@@ -310,10 +295,8 @@ def gluing_rows(
     A free component of a node with m copies has m − 1 gluing rows of unit length (see `weighted_helmert`, c =
     0). A prescribed one has m rows, one for each copy, which glue it as well. Components are along the `axes`
     of nodes, which keeps them orthogonal. Dependent nodes have no rows, as each copy follows its masters.
-
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `dependent`: numbers of
-    nodes that hang or are centres, none of which is; `rank`: the one whose copies the entries are on; None:
-    all entries.
+    `dependent`: numbers of nodes that hang or are centres, none of which is; `rank`: the one whose copies the
+    entries are on; None: all entries.
     """
     here = np.full(len(tearing.copy_subdomain), rank is None)
     here |= tearing.subdomain_rank[tearing.copy_subdomain] == rank
@@ -383,15 +366,9 @@ def _glued_entries(
 class Decomposition:
     """A scene cut into subdomains; each rank holds the meshes of its own.
 
-    Attributes:
-        comm: Communicator over which the subdomains are spread.
-        tearing: Numbering of nodes, copies and subdomains, replicated.
-        partitions: Body name -> subdomain of every cell within the body, replicated.
-        meshes: This rank's subdomain meshes, ascending by number.
-        block_offset: First block of dofs of each of them in this rank's torn vector, and the total.
-        copy_block: Block of each copy in this rank's torn vector, −1 if another rank holds it.
-        gluing: Gluing and Dirichlet rows of all subdomains, with entries on this rank's.
-        compact: Whether a state fits into memory only with subdomains stored as `LocalKind.COMPACT`.
+    `block_offset`: first block of dofs of each of them in this rank's torn vector, and the total;
+    `copy_block`: block of each copy in this rank's torn vector, −1 if another rank holds it; `compact`:
+    whether a state fits into memory only with subdomains stored as `LocalKind.COMPACT`.
     """
 
     comm: MPI.Comm
@@ -466,8 +443,6 @@ class Decomposition:
         """Return the subdomains with the rows of a scene's supports: itself if it holds the same. Collective.
 
         In Total FETI what supports hold is in these rows alone: matrices, kernels and factors stay.
-
-        `scene`: one with the same meshes.
         """
         with together(self.comm):
             prescribed, axes = prescribed_along(scene, self.tearing)
@@ -595,24 +570,14 @@ def _copy_blocks(tearing: Tearing, meshes: tuple[SubdomainMesh, ...], block_offs
 class DualNumbering:
     """Numbering of multipliers over ranks: each is owned by one rank and shared by those that touch it.
 
-    Rows of B are first numbered in an order that does not depend on the number of ranks (*row numbers*).
-    A rank owns some of them, in ascending order; *local* vectors hold the owned entries followed by the
-    ghosts, the touched entries that other ranks own.
-
-    Attributes:
-        owned: Row numbers that this rank owns, ascending, shape (n_owned,).
-        ghosts: Row numbers that it touches but does not own, ascending, shape (n_ghosts,).
-        offset: Position of the first owned entry in the concatenation of all ranks' owned parts.
-        total: Number of rows of all ranks.
-        owner: Owning rank of every row, shape (total,), replicated.
+    Rows of B are first numbered in an order that does not depend on the number of ranks (*row numbers*). A
+    rank owns some of them, in ascending order; *local* vectors hold the owned entries followed by the ghosts,
+    the touched entries that other ranks own. `ghosts`: row numbers that it touches but does not own,
+    ascending; `offset`: position of the first owned entry in the concatenation of all ranks' owned parts.
     """
 
     def __init__(self, comm: MPI.Comm, owner: np.ndarray, touched: np.ndarray) -> None:
-        """Build numbering and exchange. Collective on ``comm``.
-
-        `owner`: owning rank of every row, shape (n_rows,), replicated; `touched`: row numbers that this
-        rank's subdomains enter, ascending.
-        """
+        """Build numbering and exchange. Collective on ``comm``."""
         self.comm = comm
         self.total = len(owner)
         self.owner, self._touched = owner, touched
@@ -680,12 +645,7 @@ class DualNumbering:
         return np.asarray(self.comm.allreduce(mine))
 
     def sum_rows(self, local: sp.csr_matrix) -> sp.csr_matrix:
-        """Add up the ranks' shares of a sparse matrix with one row for each multiplier. Collective.
-
-        `local`: this rank's share, shape (n_local, n_columns), rows as in local vectors.
-
-        Returns the owned rows, shape (n_owned, n_columns).
-        """
+        """Add up the ranks' shares of a sparse matrix with one row for each multiplier. Collective."""
         own, shares = local[: len(self.owned)], local[len(self.owned) :].tocoo()
         ghosts = self.ghosts[shares.row]
         row, column, value = sent(self.comm, self.owner[ghosts], ghosts, shares.col, shares.data)

@@ -27,10 +27,8 @@ WRONG = 1e-4
 class DirectSolution:
     """Displacement and reactions of one body.
 
-    Attributes:
-        displacement: u, shape (torn_size,), [length].
-        multiplier: Reactions of the supports, one per prescribed component, shape (n_rows,), [force].
-        gluing_residual: ‖f − K u‖ over the free components, relative to the forces that cancel there.
+    `multiplier`: reactions of the supports, one per prescribed component; `gluing_residual`: ‖f − K u‖ over
+    the free components, relative to the forces that cancel there.
     """
 
     displacement: np.ndarray
@@ -47,8 +45,7 @@ class DirectSolution:
 class DirectSystem:
     """K of one body with the prescribed components eliminated.
 
-    Attributes:
-        torn: The system; it has one subdomain and only rows of supports.
+    `torn`: the system; it has one subdomain and only rows of supports.
     """
 
     products = 0

@@ -51,11 +51,7 @@ class DirichletPreconditioner:
         numbering: DualNumbering,
         n_gluing: int,
     ) -> None:
-        """Factor the contact block of B D⁻¹ Bᵀ. Collective.
-
-        `B`: this rank's part of B on the interface, shape (n_local_rows, n_interface); `compliance`: diagonal
-        of D⁻¹, shape (n_interface,), the same for all components of a node.
-        """
+        """Factor the contact block of B D⁻¹ Bᵀ. Collective."""
         self._inverse, self._numbering = inverse, numbering
         self._soft, self._sprung = np.zeros(0, dtype=np.int64), np.zeros(0)
         self._B = scaled_columns(B, compliance)
@@ -72,23 +68,15 @@ class DirichletPreconditioner:
         """Return the preconditioner of a face; only its rows enter B D⁻¹ Bᵀ. Collective.
 
         Rows that are not on the face would stiffen their neighbours, the more the stiffer the slave.
-
-        `restriction`: Z with orthonormal columns, shape (n_owned, n_face), owned.
         """
         return PreconditionerOfFace(self, self._contact.on_face(restriction))
 
     def lifting(self, restriction: sp.csr_matrix) -> Lifting:
-        """Return the displacements of the interface that close rows of a face. Collective.
-
-        `restriction`: Z with orthonormal columns, shape (n_owned, n_face), owned.
-        """
+        """Return the displacements of the interface that close rows of a face. Collective."""
         return Lifting(self, self._contact.on_face(restriction))
 
     def soften(self, rows: np.ndarray, compliance: np.ndarray) -> None:
-        """Add 1 / C on rows that give way, which move nothing or depend on each other. Collective.
-
-        `rows`: their positions among the owned ones, shape (k,); `compliance`: C of each, shape (k,).
-        """
+        """Add 1 / C on rows that give way, which move nothing or depend on each other. Collective."""
         self._soft, self._sprung = rows, 1.0 / compliance
         marks = np.zeros(len(self._equality), dtype=bool)
         marks[rows] = True
@@ -521,11 +509,9 @@ class DualSystem:
     def _filled(self, diagonal: np.ndarray, share: float = 1e-6) -> tuple[np.ndarray, np.ndarray]:
         """Give rows that supports alone determine the diagonal of their disc, or a small one. Collective.
 
-        Small, as such a row has no flexibility: any slip that supports prescribe must count as slip.
-
-        Returns the diagonal, and marks of the rows that got a small one, both owned.
-
-        `share`: substitute flexibility of rows that have none, relative to the mean of all contact rows.
+        Small, as such a row has no flexibility: any slip that supports prescribe must count as slip. Returns
+        the diagonal, and marks of the rows that got a small one, both owned. `share`: substitute flexibility
+        of rows that have none, relative to the mean of all contact rows.
         """
         layout, comm = self.torn.layout, self.torn.numbering.comm
         total, count = comm.allreduce(

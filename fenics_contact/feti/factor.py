@@ -49,12 +49,8 @@ class Factor:
     def of_stiffness(cls, matrix: sp.csr_matrix, worst: float = 0.02) -> Factor:
         """Factor a stiffness that resists every motion.
 
-        Pivots that are rounding may be positive: a solution shows them.
-
-        `matrix`: shape (n, n); `worst`: error of a solution, see `error_of_a_solution`, that is refused.
-
-        Raises:
-            InvalidInputError: If some motion has no energy but rounding.
+        Pivots that are rounding may be positive: a solution shows them. `worst`: error of a solution, see
+        `error_of_a_solution`, that is refused.
         """
         factor = cls(matrix)
         if words := factor.doubt(matrix, worst):
@@ -156,10 +152,7 @@ def _failure(reason: str) -> ConvergenceError:
 
 
 def symmetric_matrix(matrix: sp.csr_matrix, *, shared: bool = False) -> PETSc.Mat:
-    """Return a symmetric positive definite matrix on one rank in PETSc's format.
-
-    `matrix`: the matrix, shape (n, n).
-    """
+    """Return a symmetric positive definite matrix on one rank in PETSc's format."""
     if shared and not matrix.has_canonical_format:
         matrix = matrix.copy()
         matrix.sum_duplicates()
@@ -191,12 +184,7 @@ def _solver() -> str:
 
 
 def fixing_nodes(points: np.ndarray, count: int = FIXING_NODES) -> np.ndarray:
-    """Select well-spread nodes: each one is the farthest from those already selected.
-
-    `points`: coordinates, shape (n, dim).
-
-    Returns row numbers of ``points``, shape (min(count, n),).
-    """
+    """Select well-spread nodes: each one is the farthest from those already selected."""
     distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
     chosen = [int(np.argmax(distance))]
     distance = np.linalg.norm(points - points[chosen[0]], axis=1)
@@ -209,11 +197,8 @@ def fixing_nodes(points: np.ndarray, count: int = FIXING_NODES) -> np.ndarray:
 def regularised(stiffness: sp.csr_matrix, kernel: np.ndarray, points: np.ndarray) -> sp.csr_matrix:
     """Return K + ρ R̂ R̂ᵀ, sparse and positive definite, whose inverse is a generalised inverse of K.
 
-    R̂ is the kernel restricted to a few fixing nodes and orthonormalised; ρ is the largest diagonal
-    entry of K.
-
-    `stiffness`: K, shape (dim n, dim n), block b of dim dofs at ``points[b]``; `kernel`: columns that span
-    the kernel of K, shape (dim n, n_modes); `points`: coordinates by block, shape (n, dim).
+    R̂ is the kernel restricted to a few fixing nodes and orthonormalised; ρ is the largest diagonal entry of
+    K.
 
     References:
         Brzobohatý, Dostál, Kozubek, Kovář, Markopoulos: Cholesky decomposition with fixing nodes to

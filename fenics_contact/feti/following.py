@@ -25,12 +25,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """The dependent nodes of a subdomain.
-
-    Attributes:
-        means: T, shape (n, n).
-        apart: C, shape (number of their components, n).
-    """
+    """The dependent nodes of a subdomain."""
 
     means: sp.csr_matrix
     apart: sp.csr_matrix
@@ -73,11 +68,7 @@ class Following:
 
 @dataclass(frozen=True)
 class NoneFollow:
-    """A subdomain all of whose nodes are unknowns.
-
-    Attributes:
-        size: Number of these, n.
-    """
+    """A subdomain all of whose nodes are unknowns."""
 
     size: int
 

@@ -16,12 +16,7 @@ from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces, o
 def foundation_stiffness(
     foundations: Sequence[ElasticFoundation], body: Body, cells: np.ndarray | None = None
 ) -> sp.csr_matrix:
-    """Return the stiffness of the foundations of a body, or of those under some of its cells.
-
-    `cells`: numbers of the cells; all by default.
-
-    Returns shape (n_nodes · dim, n_nodes · dim), with dofs node by node of the body.
-    """
+    """Return the stiffness of the foundations of a body, or of those under some of its cells."""
     mesh = body.mesh
     size = mesh.n_nodes * body.components
     total = sp.csr_matrix((size, size))
@@ -61,9 +56,8 @@ def separated(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Separate motions, (n, k), by whether a stiffness resists them.
 
-    `rounding`: energy of a motion that is none, relative to the largest of any displacement of its size.
-
-    Returns orthonormal coefficients of those that it does, (k, r), and of the others, (k, k − r).
+    Returns orthonormal coefficients of those that it does, (k, r), and of the others, (k, k − r). `rounding`:
+    energy of a motion that is none, relative to the largest of any displacement of its size.
     """
     basis, scale = np.linalg.qr(modes)
     values, vectors = np.linalg.eigh(basis.T @ (stiffness @ basis))

@@ -26,18 +26,12 @@ class FreeMotions:
 
     Nodes of a rigid surface are prescribed, their values depend on q. The rows of multipliers in equilibrium
     with the points, −Qᵀλ = g, are part of the coarse problem, as if every point were a body of its own whose
-    stiffness is zero. Motions are scaled to be orthonormal over the nodes of a surface.
-
-    Attributes:
-        columns: Q; on nodes a row for each component of each node, shape (n_nodes · dim, n), replicated; of
-            a system the owned rows, shape (n_owned, n).
-        load: g, shape (n,), replicated.
-        tracked: Number of the first unknowns, whose values are known at each configuration; others follow
-            from displacements.
-        nodes: Of tracked ones Q and `dyads` on the nodes, shape (n_nodes · dim, k), replicated; else None.
-        dyads: Fields on the owned rows whose work with multipliers gives the stiffness of tracked motions,
-            shape (n_owned, k − tracked); else None.
-        stiffness: −∂(g + Qᵀλ)/∂q, shape (n, n), replicated; None where it is zero.
+    stiffness is zero. Motions are scaled to be orthonormal over the nodes of a surface. `columns`: Q; on
+    nodes a row for each component of each node, replicated; of a system the owned rows; `load`: g,
+    replicated; `tracked`: number of the first unknowns, whose values are known at each configuration; others
+    follow from displacements; `nodes`: of tracked ones Q and `dyads` on the nodes, replicated; else None;
+    `dyads`: fields on the owned rows whose work with multipliers gives the stiffness of tracked motions; else
+    None; `stiffness`: −∂(g + Qᵀλ)/∂q, replicated; None where it is zero.
     """
 
     columns: sp.csr_matrix
@@ -53,11 +47,7 @@ class FreeMotions:
         return len(self.load)
 
     def on_rows(self, groups: RowGroups, fixed: np.ndarray, owned: np.ndarray) -> FreeMotions:
-        """Return those on nodes on the owned rows of a system.
-
-        Raises:
-            InvalidInputError: If in rows of ties and contacts nothing but rigid surfaces moves.
-        """
+        """Return those on nodes on the owned rows of a system."""
         if self.count == 0:
             return replace(self, columns=sp.csr_matrix((len(owned), 0)))
         return replace(self, columns=without_held(groups.columns(self.columns), groups, fixed)[owned])
@@ -72,7 +62,7 @@ class FreeMotions:
     def on_contact_rows(self, kept: sp.csr_matrix, groups: RowGroups, owned: np.ndarray) -> FreeMotions:
         """Return those of a system on the rows of other contact points.
 
-        `kept`: picks rows that stay, shape (n_owned, n_owned before); `groups`: all those of now.
+        `kept`: picks rows that stay.
         """
         columns = (kept @ self.columns).tocsr()
         if self.nodes is None:
@@ -93,9 +83,6 @@ def without_held(
 
     Rows across a plane of symmetry, or around the axis of revolution, are held: nothing moves there. At the
     tip of a cone on the axis both sides move along it: slip alone is what the normal row has already.
-
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `rounding`: of rows that
-    cancel, relative to the largest.
     """
     moving, least = np.ones(columns.shape[0]), rounding * abs(columns).max()
     for group in groups:
@@ -156,11 +143,9 @@ def _independent(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return orthonormal motions of nodes, (n, k), and the load on each, (k,).
 
-    Nodes in a line are not moved by turning about it: that motion is left out.
-
-    `modes`: motions of nodes by free components, dimensionless, (n, m); `load`: that on each, (m,), [force];
-    `near`: singular value, relative to the largest, of what moves no node, and share of the load on it that
-    is rounding.
+    Nodes in a line are not moved by turning about it: that motion is left out. `modes`: motions of nodes by
+    free components, dimensionless; `load`: that on each; `near`: singular value, relative to the largest, of
+    what moves no node, and share of the load on it that is rounding.
     """
     basis, scale = np.linalg.qr(modes)
     left, size, turned = np.linalg.svd(scale)

@@ -18,10 +18,7 @@ from fenics_contact.feti.torn import TornSystem
 
 
 def even_friction(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
-    """Return multipliers of the same effect with even friction where supports hold the slave. Collective.
-
-    `multiplier`: λ, owned.
-    """
+    """Return multipliers of the same effect with even friction where supports hold the slave. Collective."""
     rows = _held_rows(torn)
     if len(rows) == 0:
         return multiplier
@@ -84,10 +81,9 @@ def _evened(
 ) -> np.ndarray:
     """Return the most even friction, near the bounds where it is beyond them; as it is if none is within.
 
-    `tau`: of all rows, shape (n_friction · t,); `ways`: N on some rows, shape (n, k); `area`: A of their
-    points, shape (n,); `rows`: which they are, shape (n,); `bound`: Ψ, shape (n_friction,); `near`: excess
-    relative to the largest bound that is none; `most`: steps between what has the effect and what is within
-    the bounds.
+    `tau`: of all rows; `ways`: N on some rows; `area`: A of their points; `bound`: Ψ; `near`: excess relative
+    to the largest bound that is none; `most`: steps between what has the effect and what is within the
+    bounds.
     """
     weighted, width, wanted = ways / area[:, None], len(tau) // len(bound), np.zeros(len(rows))
     gram, found = cho_factor(weighted.T @ ways), tau.copy()

@@ -42,10 +42,10 @@ def gap_with_room(
 ) -> np.ndarray:
     """Return the gaps; between surfaces held by supports, penetration due to faceting is removed.
 
-    `freedom`: free part of the normals, from 0 to 1, shape (n_points,); `moved`: by how much supports close
-    the gaps, shape (n_points,); `soft`: marks of points that give way, which may be pressed, shape
-    (n_points,); `slight`: supports hold a point along its normal if the free fraction is no larger than this:
-    normals of facets are slightly tilted, and sliding along that tilt does not open a gap.
+    `freedom`: free part of the normals, from 0 to 1; `moved`: by how much supports close the gaps; `soft`:
+    marks of points that give way, which may be pressed; `slight`: supports hold a point along its normal if
+    the free fraction is no larger than this: normals of facets are slightly tilted, and sliding along that
+    tilt does not open a gap.
     """
     missing = np.where((freedom <= slight) & ~soft, moved - points.gap, 0.0)
     # A given interference is meant: it must not vanish where nothing can yield.

@@ -37,11 +37,9 @@ class ExplicitOperator:
         K⁺ = T diag(K_ii⁻¹, (S + ρ Q Qᵀ)⁻¹) Tᵀ,   T = [I, −K_ii⁻¹ K_ib; 0, I],
 
     is a symmetric generalised inverse of K. The application of a dense triangle is limited by memory
-    bandwidth alone, and reads a half to a third of what substitutions with sparse factors read.
-
-    Attributes:
-        pays_from: Number of subdomains from which one product of matrices is faster than one with a triangle
-            for each, measured with interfaces of 300 to 1000 dofs.
+    bandwidth alone, and reads a half to a third of what substitutions with sparse factors read. `pays_from`:
+    number of subdomains from which one product of matrices is faster than one with a triangle for each,
+    measured with interfaces of 300 to 1000 dofs.
     """
 
     pays_from = Rates.whole  # what the plan counts with
@@ -55,8 +53,7 @@ class ExplicitOperator:
     ) -> None:
         """Condense a subdomain on its interface.
 
-        `interface`: interface dofs b, shape (n_b,); `single`: least eigenvalue of S, scaled, in single
-        precision.
+        `single`: least eigenvalue of S, scaled, in single precision.
         """
         stiffness, self._interface = subdomain.stiffness, interface
         schur = condensations.schur_complement(stiffness, interface)
@@ -208,11 +205,8 @@ class Inverse(Protocol):
 class FactoredOperator:
     """The inverse of a stiffness by its factors, and its Schur complement by those of the inside.
 
-    Cheap to set up, and small where the interface is large.
-
-    Attributes:
-        pays_from: Number of subdomains from which substitutions at once are faster than one after the other,
-            measured with 2000 to 15 000 dofs.
+    Cheap to set up, and small where the interface is large. `pays_from`: number of subdomains from which
+    substitutions at once are faster than one after the other, measured with 2000 to 15 000 dofs.
     """
 
     pays_from = 4
@@ -220,11 +214,7 @@ class FactoredOperator:
     def __init__(
         self, stiffness: sp.csr_matrix, interface: np.ndarray, whole: Inverse, inside: Inverse | None
     ) -> None:
-        """Keep the factors and the blocks that couple the interface.
-
-        `stiffness`: of the subdomain, shape (n, n); `interface`: interface dofs b, shape (n_b,); `inside`:
-        inverse on all other dofs; None without any.
-        """
+        """Keep the factors and the blocks that couple the interface."""
         self._interface, self._factor, self._inside = interface, whole, inside
         self._rest = dofs_inside(stiffness, interface)
         rows = stiffness[interface]
@@ -312,10 +302,7 @@ class ImplicitOperator(FactoredOperator):
     """K⁺ by a sparse Cholesky factor of the regularised stiffness, S by one of the inside."""
 
     def __init__(self, subdomain: Subdomain, interface: np.ndarray) -> None:
-        """Factor a subdomain.
-
-        `interface`: interface dofs b, shape (n_b,).
-        """
+        """Factor a subdomain."""
         stiffness = subdomain.stiffness
         inside = dofs_inside(stiffness, interface)
         super().__init__(
@@ -348,15 +335,9 @@ class TornInverse:
     """K⁺ of this rank's subdomains and their operators on the interface, one after the other.
 
     Vectors on the interface hold the interface dofs of all subdomains in their order. Subdomains that are
-    alike have one operator, that of the first of their kind.
-
-    Attributes:
-        offset: First dof of each subdomain in the torn vector, and the total, shape (n + 1,).
-        interface: Interface dofs in the torn vector, shape (n_interface,).
-        operators: Those of the subdomains.
-        factored: Number of newly factored kinds; the others are reused.
-        changed: Whether any subdomain has another matrix or interface than in the previous one.
-        kinds: Of its subdomains, in the order of their first ones.
+    alike have one operator, that of the first of their kind. `interface`: interface dofs in the torn vector;
+    `changed`: whether any subdomain has another matrix or interface than in the previous one; `kinds`: of its
+    subdomains, in the order of their first ones.
     """
 
     def __init__(
@@ -371,8 +352,7 @@ class TornInverse:
     ) -> None:
         """Factor the subdomains.
 
-        `B`: this rank's part of B, shape (n_local_rows, torn_size); `shared`: whether those that are alike
-        share factors.
+        `shared`: whether those that are alike share factors.
         """
         self.offset = np.cumsum([0] + [subdomain.mesh.size for subdomain in subdomains])
         self._subdomains, self._kind, self._insides = tuple(subdomains), kind, Insides()
@@ -502,9 +482,7 @@ class TornInverse:
     def energy(self, displacement: np.ndarray) -> tuple[float, np.ndarray]:
         """Return wᵀ S w of this rank and S w, shape (n_interface,), both in double precision.
 
-        Rigid motions have no energy; they are subtracted first, to avoid cancellation.
-
-        `displacement`: w, shape (n_interface,).
+        Rigid motions have no energy; they are subtracted first, to avoid cancellation. `displacement`: w.
         """
         energy, force = 0.0, np.zeros_like(displacement)
         for index in self._by_kind:
@@ -519,10 +497,7 @@ class TornInverse:
         return max(energy, 0.0), force
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the torn displacement of least energy for one of the interface, shape (torn_size,).
-
-        `displacement`: w, shape (n_interface,).
-        """
+        """Return the torn displacement of least energy for one of the interface, shape (torn_size,)."""
         whole = np.zeros(self.offset[-1])
         for index in self._by_kind:
             if (moved := displacement[self._parts[index]]).any():

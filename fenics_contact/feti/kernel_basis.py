@@ -24,10 +24,7 @@ class TornModes:
     """R = diag(R_s) C on this rank's torn vectors: modes of its subdomains and which of them move together.
 
     Only C is stored: as a sparse matrix R would need more memory than all rows of B and their products.
-
-    Attributes:
-        parts: R_s of each subdomain, shape (size, k_s) each, as it has them.
-        coefficients: C, shape (Σ k_s, n_modes).
+    `parts`: R_s of each subdomain, as it has them; `coefficients`: C.
     """
 
     parts: tuple[np.ndarray, ...]
@@ -100,9 +97,8 @@ class TornModes:
 def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     """Return T that replaces the modes of every cut body's first subdomain by those of the body. Collective.
 
-    `offset`: first mode of each subdomain and the total, replicated, shape (n_subdomains + 1,).
-
     Returns coefficients of the new basis vectors in the old ones as columns, (n_modes, n_modes), replicated.
+    `offset`: first mode of each subdomain and the total, replicated.
     """
     comm = torn.numbering.comm
     with together(comm):
@@ -134,10 +130,8 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
 def _coefficients(subdomain: Subdomain, modes: np.ndarray, spanned: float = 1e-10) -> np.ndarray | None:
     """Return the body's modes, (n_nodes, dim, n_modes), in terms of a subdomain's, one per column.
 
-    None if they are not in its span.
-
-    `spanned`: modes of a subdomain must reproduce those of its body to this accuracy, else the subdomains'
-    own are used.
+    None if they are not in its span. `spanned`: modes of a subdomain must reproduce those of its body to this
+    accuracy, else the subdomains' own are used.
     """
     wanted = modes[subdomain.mesh.nodes].reshape(subdomain.mesh.size, modes.shape[-1])
     coefficients = np.linalg.lstsq(subdomain.kernel, wanted, rcond=None)[0]

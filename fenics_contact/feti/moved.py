@@ -15,8 +15,7 @@ from fenics_contact.feti.subdomain import LocalOperator
 class SharedOperator(LocalOperator, Protocol):
     """One that also serves several subdomains at once.
 
-    Attributes:
-        pays_from: Number of subdomains from which this is faster than one after the other.
+    `pays_from`: number of subdomains from which this is faster than one after the other.
     """
 
     pays_from: int
@@ -32,12 +31,7 @@ class SharedOperator(LocalOperator, Protocol):
 
 
 class MovedInterface:
-    """How the interface of a subdomain lies on that of the first one, w_first = T w.
-
-    Attributes:
-        place: Entry of w on each of the first one's, shape (n_b,).
-        sign: Its factor, shape (n_b,).
-    """
+    """How the interface of a subdomain lies on that of the first one, w_first = T w."""
 
     def __init__(self, motion: Motion, interface: np.ndarray, first: np.ndarray) -> None:
         """Find the interface dofs of a subdomain on those of the first one, both ascending, (n_b,)."""
@@ -55,20 +49,12 @@ class MovedInterface:
 
 
 class MovedOperator:
-    """The operator of the first subdomain of a kind for another one of it, P⁻¹ (...) P.
-
-    Attributes:
-        first: That of the first one.
-        interface: How the interface lies on that of the first one.
-    """
+    """The operator of the first subdomain of a kind for another one of it, P⁻¹ (...) P."""
 
     def __init__(
         self, first: LocalOperator, motion: Motion, interface: np.ndarray, of_first: np.ndarray
     ) -> None:
-        """Keep the motion.
-
-        `interface`: interface dofs of the subdomain, `of_first`: those of the first one, ascending, (n_b,).
-        """
+        """Keep the motion."""
         self.first, self._motion = first, motion
         self.interface = MovedInterface(motion, interface, of_first)
 
@@ -126,17 +112,13 @@ def _back(moved: np.ndarray, motion: Motion | MovedInterface) -> np.ndarray:
 
 
 class Batch:
-    """All subdomains of one kind: their vectors on the interface as the rows of a matrix.
-
-    Attributes:
-        place: Entry of this rank's interface vectors on each interface dof of the first, (n_members, n_b).
-    """
+    """All subdomains of one kind: their vectors on the interface as the rows of a matrix."""
 
     def __init__(self, members: Sequence[tuple[int, MovedInterface | None]], size: int) -> None:
         """Keep where the members are.
 
         `members`: first entry of each in this rank's interface vectors, and how its interface lies on that of
-        the first one, None where it is the same dof by dof; `size`: n_b.
+        the first one, None where it is the same dof by dof.
         """
         starts, interfaces = zip(*members, strict=True)
         own, one = np.arange(size), np.ones(size)

@@ -45,8 +45,6 @@ def once_at_periodic_edges(
     """Return points without those that equations move as others; with `areas` these get theirs.
 
     Of several the first by its place stays, whatever the numbers of nodes.
-
-    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, components), [length].
     """
     from fenics_contact._pairing.sectors import without_repeated
 
@@ -91,10 +89,8 @@ def _candidates(
 class _Across:
     """What equations leave of rows of nodes, with the motions that they prescribe along these.
 
-    Attributes:
-        right: Right sides of the equations less what supports prescribe, shape (n_rows,), [length].
-        known: Prescribed displacements of nodes, shape (n_nodes · components,), [length].
-        at_once: Dense columns.
+    `right`: right sides of the equations less what supports prescribe; `known`: prescribed displacements of
+    nodes.
     """
 
     constraints: ConstraintRows
@@ -144,9 +140,8 @@ def _equal(
 ) -> np.ndarray:
     """Return which points have the same rows and gaps as others, shape (n,).
 
-    `places`: of the slave nodes, shape (n_points, dim); `both`: numbers of points and of others, shape (n,)
-    each; `rubs`: whether both must slip alike, too, shape (n,); `same_place`: cosine between rows less what
-    equations make of them.
+    `both`: numbers of points and of others; `rubs`: whether both must slip alike, too; `same_place`: cosine
+    between rows less what equations make of them.
     """
     own, back = np.unique(np.concatenate(both), return_inverse=True)
     rows, moved = across(points.jump[own])
@@ -183,10 +178,7 @@ def _move_alike(
 def _joined(
     points: ContactPoints, places: np.ndarray, across: _Across, both: Sequence[np.ndarray], rubs: np.ndarray
 ) -> np.ndarray:
-    """Return which points are those of others on a surface that is periodic as what it meets, shape (n,).
-
-    `places`: of all nodes, shape (n_nodes, dim); `both`, `rubs`: see `_equal`.
-    """
+    """Return which points are those of others on a surface that is periodic as what it meets, shape (n,)."""
     one, other = both
     own = points.own[one] - points.own[other]
     way, (alike, moved) = own @ places, across.determined(own)

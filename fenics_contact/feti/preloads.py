@@ -30,8 +30,7 @@ from fenics_contact.feti.ties import BondedPoints, bonded_rows
 class SectionRows(BondedPoints):
     """Rows of the nodes on both sides of sections, whose slaves lie behind them.
 
-    Attributes:
-        shortenings: What unit shortenings of all preloads are in the rows, shape (n_rows, n_preloads).
+    `shortenings`: what unit shortenings of all preloads are in the rows.
     """
 
     draws = True
@@ -161,8 +160,7 @@ def _section_points(
 ) -> ContactPoints:
     """Return the nodes on both sides of all sections as tied points, whose slaves lie behind them.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`; `slight`:
-    part of a normal that supports may hold: those of planes of symmetry have rounding.
+    `slight`: part of a normal that supports may hold: those of planes of symmetry have rounding.
     """
     found = []
     for number, preload in enumerate(scene.preloads):
@@ -202,9 +200,8 @@ def _once_at_sections(
 ) -> ContactPoints:
     """Return the contact points, of two on both sides of a section one with the area of both.
 
-    Their nodes move alike across the section's normal: the force would be split at will.
-
-    `across`: largest cosine between normals of contact and section with which they count as across.
+    Their nodes move alike across the section's normal: the force would be split at will. `across`: largest
+    cosine between normals of contact and section with which they count as across.
     """
     lost, kept = [], []
     for preload in scene.preloads:

@@ -31,13 +31,10 @@ class Elimination:
 
     C is zero but for the motions c of the subdomains with contact rows. A is factored on the others, i, once,
     and each face factors S + C alone, S = A_cc − A_ci A_ii⁻¹ A_ic: dense, but small. A_ii is regular unless
-    some motion is resisted by no row at all.
-
-    Attributes:
-        equality: The equality rows among this rank's multipliers.
-        largest: It pays if c is no larger than this times m^(2/3), nor than m/2, of m motions in all: S
-            then has no more numbers than half the sparse factors of one face.
-        most: Motions beyond which the coarse matrices are distributed over ranks instead.
+    some motion is resisted by no row at all. `equality`: the equality rows among this rank's multipliers;
+    `largest`: it pays if c is no larger than this times m^(2/3), nor than m/2, of m motions in all: S then
+    has no more numbers than half the sparse factors of one face; `most`: motions beyond which the coarse
+    matrices are distributed over ranks instead.
     """
 
     equality: np.ndarray
@@ -45,10 +42,7 @@ class Elimination:
     most: int = 250_000
 
     def __call__(self, comm: MPI.Comm, columns: sp.csr_matrix) -> ReducedGrams | None:
-        """Return the reduced matrices; None where they do not pay, or A_ii is singular. Collective.
-
-        `columns`: this rank's columns of G, shape (m, n_owned).
-        """
+        """Return the reduced matrices; None where they do not pay, or A_ii is singular. Collective."""
         contact = np.ones(columns.shape[1], dtype=bool)
         contact[self.equality] = False
         touched = global_sum(comm, np.diff(columns[:, contact].indptr)) > 0.0
@@ -65,10 +59,7 @@ class Elimination:
 class ReducedGrams:
     """Inverses of A + C for faces, see `Elimination`; the factors are on the first rank.
 
-    Attributes:
-        scale: Factors that bring the entries of G Gᵀ to order one, shape (m,), replicated.
-        touched: Marks of the motions c, shape (m,), replicated.
-        eliminated: A_ii⁻¹ and what couples it; None on other ranks.
+    `touched`: marks of the motions c, replicated.
     """
 
     comm: MPI.Comm
@@ -80,10 +71,7 @@ class ReducedGrams:
     def build(
         cls, comm: MPI.Comm, columns: sp.csr_matrix, equality: np.ndarray, touched: np.ndarray
     ) -> ReducedGrams | None:
-        """Factor A_ii and form S; None where A_ii is singular. Collective.
-
-        `columns`: this rank's columns of G, shape (m, n_owned).
-        """
+        """Factor A_ii and form S; None where A_ii is singular. Collective."""
         diagonal = global_sum(comm, np.asarray(columns.power(2).sum(axis=1)).ravel())
         scale = 1.0 / np.sqrt(np.maximum(diagonal, np.finfo(float).tiny))
         glued = columns[:, equality]
@@ -94,10 +82,7 @@ class ReducedGrams:
         return cls(comm, scale, touched, eliminated) if regular else None
 
     def inverse(self, contact: sp.csr_matrix) -> ReducedInverse:
-        """Return (A + C)⁻¹. Collective.
-
-        `contact`: G_C Z_C, this rank's columns, shape (m, n).
-        """
+        """Return (A + C)⁻¹. Collective."""
         return self._inverse((contact @ contact.T).tocsr(), GramInverse)
 
     def square(
@@ -105,7 +90,7 @@ class ReducedGrams:
     ) -> ReducedInverse | None:
         """Return (A + G_u G_sᵀ)⁻¹, None if its reciprocal condition is below ``singular``. Collective.
 
-        `moving`: contact columns of G_u, shape (m, n); `tested`: those of G_s, shape (m, n).
+        `moving`: contact columns of G_u; `tested`: those of G_s.
         """
         inverse = self._inverse((moving @ tested.T).tocsr(), _square)
         return inverse if inverse.condition > singular else None
@@ -128,13 +113,7 @@ def _square(matrix: Vector) -> DenseSquareInverse:
 
 @dataclass(frozen=True, eq=False)
 class Eliminated:
-    """The motions i that no contact row resists: x_i = A_ii⁻¹ (b_i − A_ic x_c), all scaled.
-
-    Attributes:
-        factor: Of A_ii.
-        coupling: A_ic, shape (n_i, n_c).
-        reduced: S, shape (n_c, n_c).
-    """
+    """The motions i that no contact row resists: x_i = A_ii⁻¹ (b_i − A_ic x_c), all scaled."""
 
     factor: Factor
     coupling: sp.csr_matrix
@@ -177,10 +156,8 @@ class Eliminated:
 class ReducedInverse:
     """(A + C)⁻¹ by block elimination; generalised where the face does not resist all motions.
 
-    Attributes:
-        rank: Number of motions that the face resists.
-        null_space: Columns z with (A + C) z = 0, shape (m, m - rank), replicated.
-        condition: Reciprocal condition of S + C where it is unsymmetric.
+    `null_space`: columns z with (A + C) z = 0, replicated; `condition`: reciprocal condition of S + C where
+    it is unsymmetric.
     """
 
     def __init__(self, grams: ReducedGrams, block: GramInverse | DenseSquareInverse | None) -> None:

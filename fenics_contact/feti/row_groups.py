@@ -25,12 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """Unknowns q of a group of rows, and the loads on them.
-
-    Attributes:
-        columns: Q on the rows of the group, shape (count, n).
-        load: g, shape (n,), [force].
-    """
+    """Unknowns q of a group of rows, and the loads on them."""
 
     columns: sp.csr_matrix
     load: np.ndarray
@@ -144,10 +139,7 @@ class Joint(RowGroup):
     def of(
         cls, scene: Scene, decomposition: Decomposition, ties: ContactPoints, known: Sequence[Self]
     ) -> Sequence[Self]:
-        """Return the joint of a scene, an empty sequence without any. Collective.
-
-        `ties`: points of the scene's ties; `known`: joints of the scene with another geometry or load.
-        """
+        """Return the joint of a scene, an empty sequence without any. Collective."""
 
     def once(
         self, points: ContactPoints, ties: ContactPoints, scene: Scene, prescribed: np.ndarray
@@ -186,10 +178,7 @@ class Joint(RowGroup):
 
     @abstractmethod
     def wrenches(self, modes: np.ndarray, nodes: slice) -> np.ndarray:
-        """Return the work of unit forces of the joint in motions of some nodes, shape (n_modes, n).
-
-        `modes`: shape (n_nodes, dim, n_modes); `nodes`: which they are.
-        """
+        """Return the work of unit forces of the joint in motions of some nodes, shape (n_modes, n)."""
 
     def released(self, scene: Scene) -> tuple[sp.csr_matrix, np.ndarray]:
         """Return orthonormal directions among those unit forces that are known, (n, k), and their sizes."""
@@ -207,10 +196,7 @@ class Joint(RowGroup):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return c of the rows and loads of unknowns with which a state before is one of a later scene.
 
-        Unknowns of now that were held have the force that they had, those that were free and are held
-        keep what they were; c is NaN where it stays.
-
-        `before`: the joint of that state; `scene`: the later one; `jump`: B u in the rows of `before`, shape
-        (count,); `multiplier`: λ there, shape (count,).
+        Unknowns of now that were held have the force that they had, those that were free and are held keep
+        what they were; c is NaN where it stays. `jump`: B u in the rows of `before`; `multiplier`: λ there.
         """
         return np.full(self.count, np.nan), np.zeros(0)

@@ -27,9 +27,7 @@ from fenics_contact.feti.ties import JoinedPoints
 class SpringRows(JoinedPoints):
     """Rows of springs, each of which is a point.
 
-    Attributes:
-        stiffness: k, shape (n_rows,), [force / length].
-        tension: N₀, shape (n_rows,), [force].
+    `stiffness`: k; `tension`: N₀.
     """
 
     balanced_as = "beds"

@@ -57,12 +57,8 @@ class LocalOperator(Protocol):
     def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the displacement of least energy for one of the interface, and the interface force for it.
 
-        Both in double precision.
-
-        `displacement`: w of the interface, shape (n_b,).
-
-        Returns the displacement, w itself on the interface and −K_ii⁻¹ K_ib w inside, shape (n,), and S w,
-        shape (n_b,).
+        Both in double precision. Returns the displacement, w itself on the interface and −K_ii⁻¹ K_ib w
+        inside, shape (n,), and S w, shape (n_b,).
         """
 
     def invert(self, right: np.ndarray) -> np.ndarray:
@@ -78,10 +74,8 @@ def interface_dofs(
     """Return the dofs that B touches, and a few more if fixing these does not prevent rigid motions.
 
     With the interface fixed the inside must have no rigid motion, or K_ii would be singular.
-
-    `touched`: marks of the dofs, shape (n,); `kernel`: columns that span the kernel of K, shape (n, n_modes);
-    `points`: coordinates by block of dofs, shape (n_blocks, dim); `rank_tolerance`: singular values of the
-    kernel's trace on an interface below this count as zero: the modes have length one.
+    `rank_tolerance`: singular values of the kernel's trace on an interface below this count as zero: the
+    modes have length one.
     """
     modes, _ = np.linalg.qr(kernel)
     trace = np.linalg.svd(modes[touched], compute_uv=False)
@@ -96,9 +90,8 @@ def interface_dofs(
 class Expanded:
     """How cells of several shapes are hexahedra: what values at nodes are at the nodes of these.
 
-    Attributes:
-        nodes: Values by input node of the dolfinx mesh by those by block, shape (n_input, n_blocks).
-        dofs: Values of dolfinx's dofs by those of the subdomain's, shape (n, components · n_blocks).
+    `nodes`: values by input node of the dolfinx mesh by those by block, shape (n_input, n_blocks); `dofs`:
+    values of dolfinx's dofs by those of the subdomain's, shape (n, components · n_blocks).
     """
 
     nodes: sp.csr_matrix
@@ -118,16 +111,11 @@ class Expanded:
 class SubdomainMesh:
     """The part of a subdomain that does not depend on the geometry: mesh, numbering, tagged facets.
 
-    Blocks of dofs, one dof per component, are numbered as dolfinx numbers them.
-
-    Attributes:
-        cells: Cells of the body's mesh, in this mesh's order.
-        nodes: Nodes of the body, by block: block b sits on node ``nodes[b]``.
-        space: dolfinx function space of displacements on a mesh of its own, or one that subdomains with cells
-            connected alike share: nodes are where who assembled last has moved them.
-        facets: Surface of the body -> (cells, local facets) on this mesh; `facets_of` adds to it.
-        following: Its dependent nodes.
-        expanded: How cells of several shapes are hexahedra; None where they are of one shape.
+    Blocks of dofs, one dof per component, are numbered as dolfinx numbers them. `nodes`: nodes of the body,
+    by block: block b sits on node ``nodes[b]``; `space`: dolfinx function space of displacements on a mesh of
+    its own, or one that subdomains with cells connected alike share: nodes are where who assembled last has
+    moved them; `facets`: surface of the body -> (cells, local facets) on this mesh; `facets_of` adds to it;
+    `expanded`: how cells of several shapes are hexahedra; None where they are of one shape.
     """
 
     number: int
@@ -198,17 +186,8 @@ class SubdomainMesh:
 class Subdomain:
     """A subdomain with its matrices for one geometry and one load.
 
-    Those that differ only in their loads share one `matrix`.
-
-    Attributes:
-        material: The materials and their regions for which it was assembled.
-        foundations: The elastic foundations of its body.
-        loads: The loads for which it was assembled.
-        points: Coordinates by block, shape (n, dim), [length].
-        load: f_s, shape (dim n,), [force].
-        kernel: R_s, shape (dim n, n_modes): zero-energy modes as columns.
-        typical_stiffness: Mean diagonal entry of K_s, [force / length].
-        springs: Those of the tool for which it was assembled.
+    Those that differ only in their loads share one `matrix`. `load`: f_s; `kernel`: R_s: zero-energy modes as
+    columns; `typical_stiffness`: mean diagonal entry of K_s.
     """
 
     mesh: SubdomainMesh

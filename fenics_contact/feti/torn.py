@@ -86,13 +86,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class FluidLoad:
-    """What fluid between surfaces exerts.
-
-    Attributes:
-        load: On this rank's torn dofs, shape (torn_size,), [force].
-        wet: Contact points where it is, replicated, shape (n_contact,).
-        pressure: Its pressure at each of them, zero where it is not, shape (n_contact,), [force / length²].
-    """
+    """What fluid between surfaces exerts."""
 
     load: np.ndarray
     wet: np.ndarray
@@ -473,10 +467,7 @@ def _at_rest(
     prescribed: np.ndarray,
     free: FreeMotions,
 ) -> TornSystem:
-    """Return the system with what its rows measure at rest and under supports. Collective.
-
-    `free`: those on nodes.
-    """
+    """Return the system with what its rows measure at rest and under supports. Collective."""
     groups, owned, comm = rows.groups, rows.numbering.owned, decomposition.comm
     with together(comm):
         right = np.concatenate([group.right(scene, prescribed) for group in groups])
@@ -559,11 +550,7 @@ def _with_contact(
 def on_contact_rows(
     torn: TornSystem, points: ContactPoints, prescribed: np.ndarray, further: tuple[RowGroup, ...] = ()
 ) -> TornSystem:
-    """Return a system with other contact points, those of bodies that have moved. Collective.
-
-    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim); `further`: rows
-    after all others.
-    """
+    """Return a system with other contact points, those of bodies that have moved. Collective."""
     scene, decomposition = torn.scene, torn.decomposition
     groups = _with_contact(scene, decomposition, torn.groups.joints, points, prescribed, further)
     rows = _numbered(groups, decomposition, torn.numbering)
