@@ -50,12 +50,9 @@ class WeakChoice(Enum):
 class WeakPoints:
     """Numbers of points on a switch of the contact law, to the accuracy of the state, over all ranks.
 
-    Attributes:
-        discs: Friction discs at their bound without slip.
-        edges: Closed points that project on an edge between facets; they count as inside the facet they
-            project on.
-        choice: The branch that contacts and discs were given. Those of an inaccurate state that are probably
-            on one side are assigned to that side.
+    `discs`: friction discs at their bound without slip; `edges`: closed points that project on an edge
+    between facets; they count as inside the facet they project on; `choice`: the branch that contacts and
+    discs were given. Those of an inaccurate state that are probably on one side are assigned to that side.
     """
 
     contacts: int
@@ -89,12 +86,9 @@ class WeakPoints:
 class LinearisedFace:
     """Face of a state with the two bases of its linearised contact law.
 
-    Attributes:
-        tested: Z_s, test directions of the rows, shape (n_owned, n_face).
-        moving: Z_u, directions along which the multiplier varies: a slipping friction force grows with its
-            normal force by μ d, shape (n_owned, n_face).
-        slip_direction: d at the slipping discs, zero elsewhere, shape (n_friction, dim − 1), owned.
-        growing: Discs whose force grows with its normal force, shape (n_friction,), owned.
+    `tested`: Z_s, test directions of the rows; `moving`: Z_u, directions along which the multiplier varies: a
+    slipping friction force grows with its normal force by μ d; `slip_direction`: d at the slipping discs,
+    zero elsewhere, owned; `growing`: discs whose force grows with its normal force, owned.
     """
 
     face: Face
@@ -145,10 +139,8 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
 class _OnSwitch:
     """Marks of this rank's points that lie on a switch.
 
-    Attributes:
-        contact: Neither force nor gap, shape (n_contact,).
-        vanishing: Discs whose radius vanishes with the normal force of such a contact, shape (n_friction,).
-        disc: Other discs at their bound without slip, shape (n_friction,).
+    `contact`: neither force nor gap; `vanishing`: discs whose radius vanishes with the normal force of such a
+    contact; `disc`: other discs at their bound without slip.
     """
 
     contact: np.ndarray
@@ -177,15 +169,12 @@ def _uncertainty(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance from a switch beyond which a point's side is certain, owned, [force]. Collective.
 
-    It is the uncertainty of λ − ρ r due to the residuals of the state, with ρ the step: those of the
-    contact law are forces already, jumps between subdomains become forces as slips and gaps do.
-
-    Returns the distance, and that below which a point of an inaccurate state is assigned to no side, shapes
-    (size,).
-
-    `leaning`: weak points further from the switch than this fraction of the forces are assigned to the closer
-    side; `residual_share`: a contact point is weakly active if it is closer to a switch of the contact law
-    than this many residuals.
+    It is the uncertainty of λ − ρ r due to the residuals of the state, with ρ the step: those of the contact
+    law are forces already, jumps between subdomains become forces as slips and gaps do. Returns the distance,
+    and that below which a point of an inaccurate state is assigned to no side, shapes (size,). `leaning`:
+    weak points further from the switch than this fraction of the forces are assigned to the closer side;
+    `residual_share`: a contact point is weakly active if it is closer to a switch of the contact law than
+    this many residuals.
     """
     residuals = rows.residuals
     forces, jumps = residuals.natural * residuals.force_scale, residuals.gluing * residuals.gluing_scale
@@ -199,10 +188,8 @@ def _uncertainty(
 def _points_on_edges(state: State, edge_tolerance: float = 1e-6) -> int:
     """Count the closed points over an edge of their master facet, where the normal field has a kink.
 
-    Points of mortar contact represent a mean over facets and lie on none.
-
-    `edge_tolerance`: a projection within this distance of a facet's edge, in local coordinates, counts as on
-    the edge.
+    Points of mortar contact represent a mean over facets and lie on none. `edge_tolerance`: a projection
+    within this distance of a facet's edge, in local coordinates, counts as on the edge.
     """
     points = state.torn.points
     total = 0
@@ -280,10 +267,9 @@ def solve_adjoint(
     the system of a Newton step with its two bases swapped.
 
     Everything is linear in the objective, also the start and the scale of the residual: rescaling the
-    objective rescales the adjoint, to rounding.
-
-    `start`: multiplier of an adjoint to start from, owned, in any scaling; that of the same objective at a
-    less accurate state saves most products. By default the multiplier of the state.
+    objective rescales the adjoint, to rounding. `start`: multiplier of an adjoint to start from, owned, in
+    any scaling; that of the same objective at a less accurate state saves most products. By default the
+    multiplier of the state.
     """
     system = state.dual
     followed = state.torn.decomposition.on_followed(partials.by_displacement)
@@ -342,11 +328,9 @@ def solve_adjoint(
 class _Begin:
     """The start of the iteration.
 
-    Attributes:
-        point: z, shape (n_face,).
-        gradient: Residual of the equations there, shape (n_face,).
-        size: Norm of the projected residual due to the objective alone, independent of the guess.
-        rounding: Norm of what rounding leaves of a residual that the projection removes.
+    `point`: z; `gradient`: residual of the equations there; `size`: norm of the projected residual due to the
+    objective alone, independent of the guess; `rounding`: norm of what rounding leaves of a residual that the
+    projection removes.
     """
 
     point: np.ndarray
@@ -420,7 +404,7 @@ def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Pa
     """Return the derivatives of a step's objective with what all later steps add. Collective.
 
     `by_position`: derivative of the objectives of all later steps by the relative tangential displacement
-    after this step, owned, zero in all other rows, shape (n_owned,).
+    after this step, owned, zero in all other rows.
     """
     columns, compliance = state.torn.free.columns, state.torn.compliance.contact
     if compliance is not None:  # the origin is without the elastic slip of this step
@@ -437,10 +421,7 @@ def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Pa
 
 
 def slips_by_area(torn: TornSystem, multiplier: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return weight · ∂(D τ)/∂A of elastic slips by the areas of points, replicated, (n,). Collective.
-
-    `multiplier`: λ with the friction forces τ, owned; `weight`: of their rows, owned.
-    """
+    """Return weight · ∂(D τ)/∂A of elastic slips by the areas of points, replicated, (n,). Collective."""
     result, slips = np.zeros(torn.points.count), torn.groups.slips
     if slips.is_elastic:
         width = torn.components - 1
@@ -465,9 +446,8 @@ def by_slip_origin(state: State, own: Partials, adjoint_multiplier: np.ndarray) 
 class StateError:
     """First-order error of an objective at an inexact state, units of the objective.
 
-    Attributes:
-        correction: Difference of the value at the exact state, to first order.
-        spread: √Σ (share of a row or disc)², which does not vanish where shares of both signs cancel.
+    `correction`: difference of the value at the exact state, to first order; `spread`: √Σ (share of a row or
+    disc)², which does not vanish where shares of both signs cancel.
     """
 
     correction: float
@@ -489,7 +469,7 @@ def state_error(
     adjoint: Adjoint,
     unbalanced: np.ndarray,
 ) -> StateError:
-    r"""Return the effect of a state's residuals on the objective. Collective; no product.
+    """Return the effect of a state's residuals on the objective. Collective; no product.
 
     The state is u = K⁺(f − Bᵀλ) + R α. Its residuals are r = −(B u − c) along the test directions of the
     face, to which a slipping disc adds κ s, with the part s of its force across the slip: there the law

@@ -167,11 +167,7 @@ class DesignProblem(ABC, Generic[Point]):
 
 
 class SingleProblem(DesignProblem[DesignPoint]):
-    """A design problem with one state a design.
-
-    Attributes:
-        objective: The objective.
-    """
+    """A design problem with one state a design."""
 
     objective: Objective
 
@@ -203,8 +199,8 @@ class DesignFunction:
     """c(α) of another objective, with a subgradient, at the states of a `ShapeProblem`.
 
     For constraints: the problem solves the state of a design when its own objective is evaluated, and this
-    function costs one adjoint more. At a design whose state is not known it is solved first. Products
-    with F are counted by the problem.
+    function costs one adjoint more. At a design whose state is not known it is solved first. Products with F
+    are counted by the problem.
     """
 
     def __init__(self, problem: SingleProblem, objective: Objective, name: str | None = None) -> None:
@@ -240,8 +236,6 @@ class DesignFunction:
 
         The known state, which is as accurate as its subgradient needs, is used if its effect on c is small
         enough, else it is solved to the smallest tolerance.
-
-        `alpha`: design variables, shape (size,), [length].
         """
         point = self._at_known_state(alpha)
         if point.error > value:
@@ -285,9 +279,7 @@ def with_fewest_weak_points(
 
     In a generic direction, points leave their switches, and their branches together are those of an actual
     design. A point that is still on its switch far away does not depend on the design to first order: either
-    branch gives the same derivative.
-
-    `alpha`: design variables, shape (size,), [length]; `end`: A design nearby, shape (size,), [length].
+    branch gives the same derivative. `end`: A design nearby.
     """
     best: Point | None = None
     refused: InvalidDesignError | None = None

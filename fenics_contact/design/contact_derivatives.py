@@ -55,10 +55,7 @@ def bounds_by_area(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndar
     """Vector-Jacobian product of the slip bounds with respect to the areas of the points, (n_points,).
 
     Tresca's bound is a traction times a nodal area, which moves with the nodes; so is a limit, and a curve
-    gives tractions at pressures.
-
-    `normal_force`: λ_N of the points, shape (n_points,), [force]; `by_bound`: derivative by each frictional
-    point's slip bound, shape (n_friction,).
+    gives tractions at pressures. `by_bound`: derivative by each frictional point's slip bound.
     """
     by_area = np.zeros(torn.points.count)
     area = torn.points.area[torn.frictional]
@@ -70,10 +67,7 @@ def bounds_by_area(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndar
 
 
 def closures_by_area(torn: TornSystem, multiplier: np.ndarray, adjoint: np.ndarray) -> np.ndarray | float:
-    """Return dJ by the areas of points through compliances, ζ ∂C/∂A, replicated, (n_points,). Collective.
-
-    `multiplier`: λ, owned; `adjoint`: its ζ, owned. Zero where contact is exact.
-    """
+    """Return dJ by the areas of points through compliances, ζ ∂C/∂A, replicated, (n_points,). Collective."""
     if torn.compliance.contact is None:
         return 0.0
     by_area = slips_by_area(torn, multiplier, adjoint)
@@ -88,9 +82,6 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
 
     Friction given as a function of position changes with the place of the node: a bound μ(x) λ_N by λ_N ∇μ,
     Tresca's bound by the area times the gradient of the traction. Gradients are central differences.
-
-    `normal_force`: λ_N of the points, shape (n_points,), [force]; `by_bound`: derivative by each frictional
-    point's slip bound, shape (n_friction,).
     """
     points = torn.points
     result, by_all = np.zeros((points.count, torn.components)), np.zeros(points.count)
@@ -116,9 +107,7 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
 class PairedFields:
     """State and adjoint as derivatives by the geometry combine them: multipliers of one, motion of the other.
 
-    Attributes:
-        multipliers: λ and ζ − ∂J/∂(B u − c), owned.
-        displacements: w and u, torn displacements of this rank, shape (torn_size,) each.
+    `multipliers`: λ and ζ − ∂J/∂(B u − c), owned; `displacements`: w and u, torn displacements of this rank.
     """
 
     multipliers: tuple[np.ndarray, np.ndarray]
@@ -129,11 +118,8 @@ class PairedFields:
 class PointMotions:
     """Displacements of state and adjoint at points, replicated.
 
-    Attributes:
-        nodes: Nodes of slaves and masters, ascending, shape (n_nodes,).
-        values: Displacement of these nodes, of the adjoint and of the state, shape (2, n_nodes, dim): each
-            multiplier is paired with the other field.
-        relative: Slave minus master displacement, shape (2, n, dim), in the same order.
+    `values`: displacement of these nodes, of the adjoint and of the state, shape (2, n_nodes, dim): each
+    multiplier is paired with the other field; `relative`: slave minus master displacement, in the same order.
     """
 
     nodes: np.ndarray
@@ -160,15 +146,7 @@ def point_motions(
 
 @dataclass(frozen=True)
 class MortarDerivatives:
-    """Derivatives of a scalar by mortar points.
-
-    Attributes:
-        pulled: Forces p on the master, in the equations of adjoint and state: that by the weight of node j is
-            the sum over both of p · v_j, shape (2, n, dim).
-        normal: By the normals, shape (n, dim).
-        gap: By the gaps, shape (n,).
-        area: By the areas, shape (n,).
-    """
+    """Derivatives of a scalar by mortar points."""
 
     pulled: np.ndarray
     normal: np.ndarray
@@ -183,10 +161,7 @@ def mortar_by_shape(
     motions: PointMotions,
     by: MortarDerivatives,
 ) -> np.ndarray:
-    """Return the derivative by the nodes of all bodies, replicated, shape (n_nodes, dim). Collective.
-
-    `points`: slave nodes among those of all bodies, ascending, shape (n,).
-    """
+    """Return the derivative by the nodes of all bodies, replicated, shape (n_nodes, dim). Collective."""
     tearing, scene = torn.decomposition.tearing, torn.scene
     assert isinstance(pair.master, Surface)
     slave, master = slave_of(scene, pair, pair.geometry), surface_of(scene, pair.master, pair.geometry)
@@ -215,8 +190,6 @@ def mortar_points_pulled_back(
 
     Gaps between true surfaces are those that linear displacements can close: combinations of gaps at the
     nodes of both, each of which is a projection.
-
-    `comm`: communicator of the ranks that share the work, all with the same arguments.
     """
     slave, master, coupling, gaps = points.slave, points.master, points.coupling, points.closable
     by_slave, by_master = np.zeros_like(slave.points), np.zeros_like(master.points)
@@ -265,9 +238,7 @@ def _gaps_pulled_back(
 class RowFields(PointMotions):
     """Multipliers and displacements of state and adjoint at the contact points, replicated.
 
-    Attributes:
-        normal: λ_N and ζ_N, shape (2, n).
-        friction: τ and ζ_T in the points' tangents, shape (2, n, dim - 1).
+    `normal`: λ_N and ζ_N; `friction`: τ and ζ_T in the points' tangents.
     """
 
     normal: np.ndarray
@@ -323,11 +294,7 @@ def contact_by_shape(
 def add_areas(
     result: np.ndarray, torn: TornSystem, index: int, by_area: np.ndarray, places: np.ndarray | None = None
 ) -> None:
-    """Add the derivative by the nodes through the areas on the slave surface of a pair.
-
-    `result`: by the nodes of all bodies, shape (n_nodes, dim); `by_area`: by the areas of all points, shape
-    (n_points,); `places`: where all nodes lie, shape (n_nodes, dim), [length]; undeformed by default.
-    """
+    """Add the derivative by the nodes through the areas on the slave surface of a pair."""
     pair = torn.scene.contacts[index]
     slave, given = torn.points.of_surface(index, by_area)
     if given.any():
@@ -421,8 +388,7 @@ def _by_point(
 ) -> PointDerivatives:
     """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g; rows −n·rel(v) and t·rel(v), rel(v) = v_s − Σ w_j v_j.
 
-    `mine`: the points to differentiate, shape (m,); `corners`: displacements of the corners of their master
-    facets, shape (2, m, corners, dim).
+    `mine`: the points to differentiate; `corners`: displacements of the corners of their master facets.
     """
     force, friction, relative = rows.normal[:, mine], rows.friction[:, mine], rows.relative[:, mine]
     normal = np.einsum("kn,knd->nd", force, relative)

@@ -29,12 +29,7 @@ from fenics_contact.shapes.simple import SurfaceShape
 
 
 def bernstein(parameters: np.ndarray, count: int) -> np.ndarray:
-    """Evaluate the ``count`` Bernstein polynomials of degree count − 1, B_k(t) = C(n,k) t^k (1 − t)^(n − k).
-
-    `parameters`: t in [0, 1], shape (m,).
-
-    Returns values, shape (m, count); each row is a partition of unity.
-    """
+    """Evaluate all Bernstein polynomials of degree count − 1, B_k(t) = C(n,k) t^k (1 − t)^(n − k)."""
     k = np.arange(count)
     t = parameters[:, None]
     return comb(count - 1, k) * t**k * (1 - t) ** (count - 1 - k)
@@ -42,8 +37,6 @@ def bernstein(parameters: np.ndarray, count: int) -> np.ndarray:
 
 def tensor_bernstein(parameters: np.ndarray, counts: tuple[int, ...]) -> np.ndarray:
     """Evaluate products B_k(s) B_l(t), on a curve B_k(s).
-
-    `parameters`: (s, t) in the unit square, shape (m, 2), or s in the unit interval, (m, 1).
 
     Returns values, shape (m, product of the counts); l runs fastest.
     """

@@ -40,10 +40,9 @@ Materials = tuple[Material, ...]
 class Density:
     """What is integrated over a body.
 
-    Attributes:
-        integrand: Takes displacement, coordinates, stress and the constants (UFL), returns a UFL scalar.
-        in_space: Whether the stress of plane bodies has the component normal to the plane, too.
-        degree: Degree of its quadrature on linear cells.
+    `integrand`: takes displacement, coordinates, stress and the constants (UFL), returns a UFL scalar;
+    `in_space`: whether the stress of plane bodies has the component normal to the plane, too; `degree`:
+    degree of its quadrature on linear cells.
     """
 
     name: str
@@ -57,10 +56,6 @@ class ShapeForms:
     """Compiled functionals of one or two displacement fields and their derivatives.
 
     A functional is compiled on first use, by all ranks together. ``materials`` are those of a `Composition`.
-
-    Attributes:
-        moving: Marks of the nodes of all bodies that a design moves, or None for all; derivatives by other
-            nodes are not needed.
     """
 
     def __init__(self, comm: MPI.Comm, moving: np.ndarray | None = None) -> None:

@@ -30,10 +30,7 @@ def field_by_places(
     by_values: np.ndarray,
     moving: np.ndarray | None,
 ) -> np.ndarray:
-    """Return Σ_c g_c ∇f_c at the nodes that move, by dof of the displacement, shape (size,).
-
-    `moving`: marks of the nodes of all bodies that move, or None for all.
-    """
+    """Return Σ_c g_c ∇f_c at the nodes that move, by dof of the displacement, shape (size,)."""
     mesh, dim, mesh_of_body = subdomain.mesh, torn.components, torn.scene.bodies[subdomain.mesh.body].mesh
     nodes = np.sort(mesh.nodes)
     chosen = np.ones(len(nodes), dtype=bool)
@@ -59,21 +56,15 @@ class _Spread:
     """A traction a + b × (x − c) and how its work along w depends on the moments of the surface.
 
     The work is L = a·W₀ + b·W₁, W₀ = ∫ w, W₁ = ∫ r × w, r = x − c. At fixed w it changes with the surface,
-    and through a = F / A, the centroid c and J b = M + (p − c) × F, J = tr(S) I − S, S = ∫ r rᵀ. With
-    y = J⁻¹ W₁
+    and through a = F / A, the centroid c and J b = M + (p − c) × F, J = tr(S) I − S, S = ∫ r rᵀ. With y = J⁻¹
+    W₁
 
         δL = ∫δ (t·w + α + β·r + rᵀ Γ r),   α = −a·W₀ / A,   β = −(W₀ × b + F × y) / A,
         Γ = (y bᵀ + b yᵀ) / 2 − (y·b) I,
 
     with F × y only where the force acts at a given point. All vectors have three components; those of plane
-    bodies lie in the plane, and turning vectors normal to it.
-
-    Attributes:
-        even: a, shape (3,).
-        turning: b, shape (3,).
-        centre: c, shape (3,).
-        linear: β, shape (3,).
-        square: Γ, shape (3, 3).
+    bodies lie in the plane, and turning vectors normal to it. `even`: a; `turning`: b; `centre`: c; `linear`:
+    β; `square`: Γ.
     """
 
     even: np.ndarray
@@ -154,10 +145,7 @@ def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndar
 
 
 def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of a(u, w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
-
-    `u`: torn displacement of this rank, [length].
-    """
+    """Return ∂/∂X of a(u, w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim)."""
     if forms.nothing_moves:
         return np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
     for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies without a part on them

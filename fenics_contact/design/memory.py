@@ -59,14 +59,8 @@ class DesignPoint:
 class JointPoint:
     """An evaluated design of several problems: of all load cases, or of all steps of a load path.
 
-    Attributes:
-        alpha: Design variables, shape (size,), [length].
-        value: J, the largest or the sum of the parts.
-        gradient: Its gradient or subgradient, see `DesignPoint`, shape (size,).
-        weak: Weakly active points of all parts that the gradient is made of.
-        parts: Name of the case or step -> its state, its own objective and its share of the gradient; of a
-            path up to the last step with an objective.
-        error: Safe estimate of the error of the value, where the tolerance is adaptive.
+    `value`: J, the largest or the sum of the parts; `parts`: name of the case or step -> its state, its own
+    objective and its share of the gradient; of a path up to the last step with an objective.
     """
 
     alpha: np.ndarray
@@ -171,10 +165,7 @@ def record_of_values(again: Callable[[np.ndarray], RecordedPoint]) -> DesignReco
 class DesignMemory(DesignRecord[DesignPoint]):
     """The evaluated designs of a problem, the state from which the next one starts, and the cost so far.
 
-    Attributes:
-        state: State from which the next one starts, None before the first.
-        error_by_tolerance: Error of the last value divided by the tolerance of its state, 0 before the first.
-        products: F-products of states and adjoints so far.
+    `error_by_tolerance`: error of the last value divided by the tolerance of its state, 0 before the first.
     """
 
     def __init__(self, restore: Callable[[np.ndarray, Stored], AnyState]) -> None:

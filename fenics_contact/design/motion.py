@@ -79,10 +79,7 @@ class _Component:
     def __init__(
         self, space: _dolfinx.fem.FunctionSpace, matrix: PETSc.Mat, given: np.ndarray, free: np.ndarray
     ) -> None:
-        """Factor the matrix of the free nodes. Collective.
-
-        `given`: marks of the nodes where it is given, shape (n_nodes,).
-        """
+        """Factor the matrix of the free nodes. Collective."""
         self._given, self._free = _Nodes.chosen(space, given), _Nodes.chosen(space, free)
         inner = matrix.createSubMatrix(self._free.rows, self._free.rows)
         self._coupling = matrix.createSubMatrix(self._free.rows, self._given.rows)
@@ -127,9 +124,7 @@ class MeshMotion:
     where held: large cells give way and small ones keep their shape. On equal cells it is harmonic. Sides
     along which the surface moves stay flat. All is integrated over the reference mesh: the motion is linear
     in the surface displacement, and one factorisation serves all designs and, transposed, all gradients.
-
-    Attributes:
-        held: Components of nodes that do not move, shape (n_nodes, dim).
+    `held`: components of nodes that do not move.
 
     References:
         Stein, Tezduyar and Benson, Mesh moving techniques for fluid-structure interactions with large
@@ -152,11 +147,10 @@ class MeshMotion:
     ) -> None:
         """Assemble and factor the stiffness of a mesh. Collective on the decomposition's communicator.
 
-        `decomposition`: which rank owns which cells; `body`: the body in its reference shape; `held`:
-        components of nodes that do not move, shape (n_nodes, dim): all of them, or on a plane of symmetry the
-        one across it; `cut`: where planes are not normal to the axes, which nodes lie on which plane, shape
-        (n_nodes, n_planes), and their normals: there the mesh moves as it would without them, less the
-        component across them, and the rest follows once more.
+        `held`: components of nodes that do not move: all of them, or on a plane of symmetry the one across
+        it; `cut`: where planes are not normal to the axes, which nodes lie on which plane, and their normals:
+        there the mesh moves as it would without them, less the component across them, and the rest follows
+        once more.
         """
         both = int(np.count_nonzero(held[moving].all(axis=1)))
         if both:
@@ -208,10 +202,7 @@ class MeshMotion:
         return within_planes(vectors, marks[self._sliding], planes)
 
     def pull_back(self, gradient: np.ndarray) -> np.ndarray:
-        """Return the transpose of `extend` applied to nodal derivatives, shape (n_moving, dim). Collective.
-
-        `gradient`: derivative by the displacement of every node, shape (n_nodes, dim), replicated.
-        """
+        """Return the transpose of `extend` applied to nodal derivatives, (n_moving, dim). Collective."""
         check_not_forked()
         result = np.array(gradient, dtype=float)
         following = np.zeros((len(self.moving), result.shape[1]))
@@ -296,17 +287,11 @@ def volume_by_points(mesh: BodyMesh, measure: Measure = PLAIN) -> np.ndarray:
 class DesignGeometry:
     """The moving surfaces of a scene with their mesh motions, shared by all load cases of a design.
 
-    Attributes:
-        designs: The moving surfaces; α is the concatenation of their variables.
-        moving: Body name -> marks of the nodes that a design moves, shape (n_nodes,).
-        forms: Compiled derivatives of integrals where nodes move.
+    `designs`: the moving surfaces; α is the concatenation of their variables.
     """
 
     def __init__(self, scene: Scene, decomposition: Decomposition, designs: Sequence[SurfaceDesign]) -> None:
-        """Prepare the mesh motion. Collective on the decomposition's communicator.
-
-        `scene`: the scene in its reference shape.
-        """
+        """Prepare the mesh motion. Collective on the decomposition's communicator."""
         for name, body in scene.bodies.items():
             require_none(
                 body.mesh.followers, f"a design with body {name!r}", "refine it everywhere, or take simplices"
@@ -331,12 +316,7 @@ class DesignGeometry:
         self._last: tuple[np.ndarray, dict[str, Body]] | None = None
 
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the coordinates of the designed bodies; of the last design they are known. Collective.
-
-        `alpha`: design variables, shape (size,), [length].
-
-        Returns body name -> coordinates, shape (n_nodes, dim), [length].
-        """
+        """Return the coordinates of the designed bodies; of the last design they are known. Collective."""
         alpha = checked_variables(alpha, self.size, self._decomposition.comm)
         if self._points is None or not np.array_equal(self._points[0], alpha):
             self._points = alpha.copy(), self._moved(alpha)

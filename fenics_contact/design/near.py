@@ -25,12 +25,7 @@ class MeanNear(Weighable, ABC):
     """J = ∫ w f dx / ∫ w dx with the weight w = (1 − |x − x₀|² / R²)² within the radius R, zero beyond.
 
     A value in a point has no derivative that a mesh resolves, and at a corner no limit: a mean over a given
-    radius has both.
-
-    Attributes:
-        body: Name of the body.
-        at: x₀, in the body or on its surface, shape (dim,), [length].
-        radius: R, [length]; two or more cells.
+    radius has both. `at`: x₀, in the body or on its surface; `radius`: R; two or more cells.
     """
 
     can_be_infinite = False

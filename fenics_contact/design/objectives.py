@@ -84,8 +84,7 @@ class ContactForces(Weighable):
 def on_rows(state: State, normal: np.ndarray | None, tangential: np.ndarray | None) -> np.ndarray:
     """Return values at the contact points in the owned rows of B, zero in all others, shape (n_owned,).
 
-    `normal`: values for the normal rows, shape (n_points,), or None for zero; `tangential`: values for the
-    tangential rows, in the points' tangents, shape (n_points, dim − 1), or None; those of points without
+    `tangential`: values for the tangential rows, in the points' tangents, or None; those of points without
     friction, which have no such rows, are left out.
     """
     torn = state.torn
@@ -192,11 +191,9 @@ class OfPressures(Weighable, ABC):
     """J = φ(λ_N, A), a function of normal forces and areas of the slave's nodes.
 
     A node's pressure is its force over its area, that of the deformed slave where it deforms much, as of
-    `ContactResult.pressure`. Nodes on the rim of a surface have small areas: where facets
-    are wide, their pressure is less certain than that of the others.
-
-    Attributes:
-        pair: Number of the contact pair in the scene; None for the points of all pairs.
+    `ContactResult.pressure`. Nodes on the rim of a surface have small areas: where facets are wide, their
+    pressure is less certain than that of the others. `pair`: number of the contact pair in the scene; None
+    for the points of all pairs.
     """
 
     pair: int | None = None

@@ -117,14 +117,7 @@ def _rings(near: sp.csr_matrix, rings: int, start: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Patches:
-    """Pressing nodes of a slave.
-
-    Attributes:
-        node: Their positions among the slave's nodes, shape (n,).
-        near: Which of them have a facet in common, shape (n, n).
-        area: Their areas, shape (n,).
-        tangents: Their tangents, shape (n, dim − 1, dim).
-    """
+    """Pressing nodes of a slave."""
 
     slave: FacetedSurface
     node: np.ndarray

@@ -51,9 +51,8 @@ def design_state(
 ) -> AnyState:
     """Compute the equilibrium of a design, whose surfaces may overlap before they are loaded. Collective.
 
-    `scene`: the scene in the shape of the design; `start`: state of a neighbouring design, or None for the
-    first one; `before`: state of the same design after the last load step, or None; `refinements`: body name
-    -> refinement of its mesh in ``start`` that led to that of the scene, None where the meshes are the same.
+    `before`: state of the same design after the last load step, or None; `refinements`: body name ->
+    refinement of its mesh in ``start`` that led to that of the scene, None where the meshes are the same.
     """
     if scene.is_nonlinear and before is not None:
         raise InvalidInputError(

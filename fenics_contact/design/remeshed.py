@@ -38,10 +38,7 @@ SAME = 1e-9
 def meshed(
     scene: Scene, designs: Sequence[SurfaceDesign], mesher: Mesher, comm: MPI.Comm
 ) -> tuple[Scene, tuple[SurfaceDesign, ...]]:
-    """Return the scene with new meshes of the designed bodies, made on rank 0, and the designs on them.
-
-    `scene`: the scene in the shape of a design.
-    """
+    """Return the scene with new meshes of the designed bodies, made on rank 0, and the designs on them."""
     names = sorted({design.body for design in designs})
     made: dict[str, BodyMesh] = {}
     with together(comm):
@@ -130,9 +127,7 @@ logger = logging.getLogger(__name__)
 class Remeshing:
     """A change of the mesh.
 
-    Attributes:
-        alpha: The design in whose shape the new mesh was made, shape (size,), [length].
-        after: J there on the new mesh: both are off by their discretisation errors.
+    `after`: J there on the new mesh: both are off by their discretisation errors.
     """
 
     alpha: np.ndarray

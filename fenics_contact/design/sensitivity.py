@@ -49,8 +49,6 @@ def by_true_areas(state: State, by_area: np.ndarray) -> dict[str, np.ndarray]:
 
     Areas of the undeformed slave change with the shape alone. Those of a deformed one change with the places
     x = X + u of its nodes, by mortar also with the master's: with the displacement and the shape alike.
-
-    `by_area`: derivative by `ContactResult.area`, replicated, shape (n_points,).
     """
     moved = state.equilibrium.evaluation.contact if isinstance(state, DeformedState) else None
     points = None if moved is None else moved.points
@@ -81,8 +79,8 @@ def solve_deformed_adjoint(
 ) -> Adjoint:
     """Solve the transpose of the linearised equations at a deformed state. Collective.
 
-    Its tangents are factored once more at the state itself, with the stiffness of forces that turn with
-    their surfaces; the columns of the face's two bases are swapped.
+    Its tangents are factored once more at the state itself, with the stiffness of forces that turn with their
+    surfaces; the columns of the face's two bases are swapped.
     """
     _require_differentiable(state)
     evaluation, torn = state.equilibrium.evaluation, state.torn
@@ -183,8 +181,6 @@ def adjoint_of(
 ) -> tuple[Adjoint, StateError, Partials]:
     """Solve the adjoint of a state and weigh its residuals with it. Collective.
 
-    Returns both, and the derivatives of the objective, with those by slips that friction follows.
-
     `start`: multiplier of a neighbouring adjoint, owned, or None; not used for deformed states.
     """
     if isinstance(state, DeformedState):
@@ -208,10 +204,7 @@ def adjoint_of(
 def by_nodes(
     state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace, forms: ShapeForms
 ) -> np.ndarray:
-    """Sum the objective's own derivative, −wᵀ δ(f_int − f) and the share of contacts and ties. Collective.
-
-    Returns the derivative by the nodes of all bodies, replicated, shape (n_nodes, dim).
-    """
+    """Sum the objective's own derivative, −wᵀ δ(f_int − f) and the share of contacts and ties. Collective."""
     torn, u, w = state.torn, state.torn_displacement, adjoint.displacement
     work = work_by_shape(forms, torn, u, w)
     fields = PairedFields((state.solution.multiplier, adjoint.multiplier - partials.by_jump), (w, u))

@@ -26,9 +26,7 @@ from fenics_contact.results.deformed_state import AnyState
 class JointProblem(DesignProblem[JointPoint]):
     """A design problem with several states a design.
 
-    Attributes:
-        problems: Name of each case or step -> its problem; all are made of the first by `ShapeProblem.case`.
-        objectives: Name of each case, or of each step that has one -> its objective.
+    `objectives`: name of each case, or of each step that has one -> its objective.
     """
 
     problems: dict[str, ShapeProblem]

@@ -28,12 +28,8 @@ def solve_following_slip(
 
     With coefficients held, the adjoint w gives ∂J/∂Ψ of slip bounds. By Ψ = μ(s) λ_N these depend on slips,
     which the objective depends on in turn by y = ∂J/∂Ψ λ_N μ'(s), along the slip. The adjoint is linear in
-    the objective: y = b + M y, which GMRES solves at the cost of an adjoint for each product.
-
-    Returns the adjoint, and the derivatives of the objective with those by the slips.
-
-    Raises:
-        ConvergenceError: If the tolerance is not reached.
+    the objective: y = b + M y, which GMRES solves at the cost of an adjoint for each product. Returns the
+    adjoint, and the derivatives of the objective with those by the slips.
     """
     torn, spent = state.torn, 0
     slope, direction = _slopes(state)

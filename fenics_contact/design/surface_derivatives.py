@@ -31,8 +31,7 @@ def normals_pulled_back(
 ) -> np.ndarray:
     """Vector-Jacobian product of the unit normals with respect to the surface's nodes, shape (n, dim).
 
-    `by_normals`: derivative by each nodal normal, shape (n, dim); `by_averaged`: direct derivative by each
-    averaged normal, shape (n, dim).
+    `by_averaged`: direct derivative by each averaged normal.
     """
     along = np.einsum("nd,nd->n", surface.normals, by_normals)
     by_true = by_normals - along[:, None] * surface.normals
@@ -54,9 +53,6 @@ def slopes_pulled_back(
     surface: FacetedSurface, facet: np.ndarray, by_slopes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return derivatives from those by the slopes of true surfaces, see `surfaces.relief.slopes`.
-
-    `facet`: facets, shape (n,); `by_slopes`: derivative by the slopes at their corners, shape (n, corners,
-    2).
 
     Derivatives by nodes, by true normals and by averaged normals, shape (n_nodes, dim) each.
     """
@@ -83,10 +79,7 @@ def slopes_pulled_back(
 
 
 def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarray:
-    """Vector-Jacobian product of the nodal areas with respect to the surface's nodes, shape (n, dim).
-
-    `by_areas`: derivative by each nodal area, shape (n,).
-    """
+    """Vector-Jacobian product of the nodal areas with respect to the surface's nodes, shape (n, dim)."""
     facets = surface.bearing
     if facets is not surface.facets or surface.measure.varies:
         return sum(
@@ -135,10 +128,7 @@ SurfaceDensity = Callable[[GaussPoint], tuple[np.ndarray, np.ndarray]]
 def integral_pulled_back(
     points: np.ndarray, facets: np.ndarray, density: SurfaceDensity, measure: Measure = PLAIN
 ) -> np.ndarray:
-    """Return the derivative of an integral over facets by the nodes, shape (n_nodes, dim).
-
-    `points`: coordinates, shape (n_nodes, dim), [length]; `measure`: what is an area.
-    """
+    """Return the derivative of an integral over facets by the nodes, shape (n_nodes, dim)."""
     result = np.zeros_like(points)
     for at in gauss_points(points, facets):
         value, by_place = measure.density(*density(at), at.of(points, facets)[:, 0])
@@ -178,14 +168,8 @@ def rotated_back(vectors: np.ndarray) -> np.ndarray:
 class PointDerivatives:
     """Derivatives of a scalar by the results of the projection at each contact point.
 
-    Attributes:
-        gap: By the gap, shape (n,).
-        normal: By the normal, shape (n, dim).
-        tangents: By the tangents, shape (n, dim − 1, dim).
-        weight: By the weights of the facet's nodes, shape (n, nodes).
-        axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
-        gradients: Of these weights in local coordinates, shape (n, nodes, dim − 1); by default those of the
-            linear shape functions of the corners.
+    `axes`: axes nearest to the first tangents; `reference_axes` by default; `gradients`: of these weights in
+    local coordinates; by default those of the linear shape functions of the corners.
     """
 
     gap: np.ndarray
@@ -201,10 +185,8 @@ def frames_pulled_back(
 ) -> np.ndarray:
     """Vector-Jacobian product of `tangent_frames` with respect to the unit normals, shape (n, dim).
 
-    Reverse of `fenics_contact._pairing.points.tangent_frames`.
-
-    `normal`: unit normals, shape (n, dim); `by_tangents`: derivative by the tangents, shape (n, dim − 1,
-    dim); `axes`: axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
+    Reverse of `fenics_contact._pairing.points.tangent_frames`. `axes`: axes nearest to the first tangents;
+    `reference_axes` by default.
     """
     if normal.shape[1] == 2:
         return rotated_back(by_tangents[:, 0])
@@ -228,12 +210,8 @@ def projection_pulled_back(
 
     The projection solves Σ N_j(ξ) x_j + r n(ξ) − x_s = 0 with n = m/‖m‖, m = Σ N_j(ξ) a_j, a_j the nodal
     normals; the implicit function theorem gives ξ and r. The gap is r − h, h(ξ) the height of the true
-    surface.
-
-    `facet`: facet of each point, shape (n,); `local`: ξ, shape (n, dim − 1); `gap`: r − h, shape (n,),
-    [length].
-
-    Returns derivative by each slave point, shape (n, dim), and by each node of the master, (n_nodes, dim).
+    surface. Returns derivative by each slave point, shape (n, dim), and by each node of the master, (n_nodes,
+    dim).
     """
     nodes = master.facets[facet]
     corners, normals = master.points[nodes], master.normals[nodes]
@@ -261,8 +239,6 @@ def projection_pulled_back(
 
 def carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes that carry a master's motion at points and the gradients of their weights.
-
-    `facet`: facet of each point, shape (n,); `local`: local coordinates on it, shape (n, dim − 1).
 
     Returns positions among the surface's nodes, shape (n, nodes), and gradients, shape (n, nodes, dim − 1).
     """
