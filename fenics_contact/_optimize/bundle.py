@@ -21,13 +21,8 @@ Array = NDArray[np.float64]
 class Plane:
     """A subgradient of one function at a point, in scaled variables, with what is known of it.
 
-    Attributes:
-        gradient: The subgradient, shape (n,).
-        value: Value of the function there.
-        noise: Error of the value.
-        pushes: Multiples of gradients of equalities that the subgradient contains, shape (r,).
-        steepness: Length of the subgradient without them.
-        doubtful: Whether it may not be a subgradient, see `Kinked`.
+    `pushes`: multiples of gradients of equalities that the subgradient contains; `steepness`: length of the
+    subgradient without them; `doubtful`: whether it may not be a subgradient, see `Kinked`.
     """
 
     gradient: Array
@@ -47,23 +42,16 @@ class Plane:
 class Bundle:
     r"""Cutting planes of the objective, all expressed at the centre x of the model.
 
-    A subgradient g_i found at y_i gives the plane J(y_i) + g_i·(z - y_i). At the centre it lies
-    below J(x) by the linearisation error α_i = J(x) - J(y_i) - g_i·(x - y_i), which is not
-    negative for a convex J. For a nonconvex one a plane far away can lie above J(x); the
-    subgradient locality measure β_i = max(\|α_i\|, c s_i²), with the distance s_i travelled since
-    y_i, pushes it below again, the further the older it is. The model at x + y is J(x) + max_i (g_i·y - β_i).
-    Row 0 belongs to the centre itself: α_0 = s_0 = 0, which makes the model exact there.
-
-    Attributes:
-        gradients: g_i in scaled variables, shape (m, n).
-        errors: α_i, shape (m,), units of J.
-        distances: s_i in scaled variables, shape (m,).
-        locality: c, units of J; 0 for a convex objective.
-        noise: Error e_i of the value of plane i, shape (m,), units of J. A plane may lie too high by e_i,
-            seen from a centre whose value is too low by e_0, and is lowered by both: an inexact plane
-            predicts no less decrease than possible.
-        doubtful: Marks of planes whose slope may not be a subgradient, see `Kinked`, shape (m,).
-        pushes: Multiples of the gradients of r equality constraints that g_i contains, shape (m, r).
+    A subgradient g_i found at y_i gives the plane J(y_i) + g_i·(z - y_i). At the centre it lies below J(x) by
+    the linearisation error α_i = J(x) - J(y_i) - g_i·(x - y_i), which is not negative for a convex J. For a
+    nonconvex one a plane far away can lie above J(x); the subgradient locality measure β_i = max(\|α_i\|, c
+    s_i²), with the distance s_i travelled since y_i, pushes it below again, the further the older it is. The
+    model at x + y is J(x) + max_i (g_i·y - β_i). Row 0 belongs to the centre itself: α_0 = s_0 = 0, which
+    makes the model exact there. `gradients`: g_i in scaled variables; `errors`: α_i, units of J; `distances`:
+    s_i in scaled variables; `locality`: c, units of J; 0 for a convex objective; `noise`: error e_i of the
+    value of plane i, units of J. A plane may lie too high by e_i, seen from a centre whose value is too low
+    by e_0, and is lowered by both: an inexact plane predicts no less decrease than possible; `pushes`:
+    multiples of the gradients of r equality constraints that g_i contains.
 
     References:
         K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization, Lecture Notes in
@@ -123,12 +111,7 @@ class Bundle:
         return Bundle(gradients, errors, self.distances, self.locality, noises, doubts, pushes)
 
     def moved(self, step: Array, change: float, locality: float, own: int = 1) -> Bundle:
-        """Return the bundle seen from a new centre, whose own plane is the last one.
-
-        `step`: move of the centre, shape (n,), scaled variables.
-
-        Returns the same planes with new errors and longer distances, the centre's plane first.
-        """
+        """Return the bundle seen from a new centre, whose own plane is the last one."""
         errors = self.errors + change - self.gradients @ step
         distances = self.distances + np.linalg.norm(step)
         errors[-1] = distances[-own:] = 0.0
@@ -144,10 +127,6 @@ class Bundle:
         Where even the weighted ones are too many, their convex combination with ``weights``, the aggregate
         plane, replaces the lightest of them: it alone preserves the predicted decrease, so that the method
         converges with any ``room`` of at least two.
-
-        `weights`: multipliers of the planes, shape (m,), not negative, sum one.
-
-        Returns the reduced bundle; row 0 stays where it is.
         """
         if self.size <= room:
             return self
@@ -202,16 +181,7 @@ def unit_rows(rows: Array, *sides: Array) -> tuple[Array, ...]:
 
 @dataclass(frozen=True)
 class QuadraticProgram:
-    """The data of min ½ yᵀ diag(h) y + qᵀy subject to E y = e and C y ≤ c.
-
-    Attributes:
-        curvature: h, shape (n,), not negative.
-        slope: q, shape (n,).
-        equality_rows: E, shape (r, n).
-        equality_values: e, shape (r,).
-        rows: C, shape (m, n).
-        limits: c, shape (m,).
-    """
+    """The data of min ½ yᵀ diag(h) y + qᵀy subject to E y = e and C y ≤ c."""
 
     curvature: Array
     slope: Array
@@ -225,11 +195,7 @@ class QuadraticProgram:
 class QuadraticSolution:
     """Minimiser of a `QuadraticProgram` and the multipliers of its rows.
 
-    Attributes:
-        point: y, shape (n,).
-        multipliers: Multipliers of C y ≤ c, shape (m,), not negative.
-        equality_multipliers: Multipliers of E y = e, shape (r,).
-        exact: False where only Clarabel's reduced tolerances were met.
+    `exact`: False where only Clarabel's reduced tolerances were met.
     """
 
     point: Array
@@ -242,14 +208,8 @@ class QuadraticSolution:
 def solve(program: QuadraticProgram) -> QuadraticSolution:
     """Solve a small convex quadratic programme; the same input gives bitwise equal results.
 
-    The tolerances are loosened, then the scaling and the regularisation changed, until Clarabel
-    reports "Solved"; an "AlmostSolved" is accepted only if no attempt does better.
-
-    Args:
-        program: The data, in units in which the solution is of order one.
-
-    Returns:
-        The minimiser, its multipliers and the status.
+    The tolerances are loosened, then the scaling and the regularisation changed, until Clarabel reports
+    "Solved"; an "AlmostSolved" is accepted only if no attempt does better.
 
     References:
         P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with
@@ -307,11 +267,7 @@ def _run_clarabel(program: QuadraticProgram, changes: Mapping[str, Any]) -> clar
 def shortest(
     equality_rows: Array, equality_values: Array, rows: Array, limits: Array, *, far: float = 1e6
 ) -> Array:
-    """Return the shortest y with E y = e and C y ≤ c, shape (n,).
-
-    `equality_rows`: E, shape (r, n); `equality_values`: e, shape (r,); `rows`: C, shape (m, n); `limits`: c,
-    shape (m,).
-    """
+    """Return the shortest y with E y = e and C y ≤ c, shape (n,)."""
     rows, limits = unit_rows(rows, limits)
     equality_rows, equality_values = unit_rows(equality_rows, equality_values)
     reach = max(-limits.min(initial=0.0), np.abs(equality_values).max(initial=0.0))

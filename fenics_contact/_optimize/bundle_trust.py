@@ -90,15 +90,12 @@ def _refuse(constraints: tuple[NonlinearConstraint, ...], values: list[float], f
 class StoppingTest:
     r"""Test on the predicted decrease w and on the certificate σ + r‖z‖.
 
-    For a convex J no feasible point within the distance r is lower than the centre by more than
-    σ + r‖z‖: this certificate holds for any t. The predicted decrease w = σ + t‖z‖² could be small only
-    because t is, so it is also tested with the first t.
-
-    Attributes:
-        limit: Decrease of J that is not worth a step, ε (s + \|J\|).
-        reach: Least r, in scaled variables; a longer step extends it to its own length.
-        slack: Largest certificate at the stop in units of ``limit``: it bounds J from below within r, more
-            than the predicted decrease claims.
+    For a convex J no feasible point within the distance r is lower than the centre by more than σ + r‖z‖:
+    this certificate holds for any t. The predicted decrease w = σ + t‖z‖² could be small only because t is,
+    so it is also tested with the first t. `limit`: decrease of J that is not worth a step, ε (s + \|J\|);
+    `reach`: least r, in scaled variables; a longer step extends it to its own length; `slack`: largest
+    certificate at the stop in units of ``limit``: it bounds J from below within r, more than the predicted
+    decrease claims.
     """
 
     limit: float

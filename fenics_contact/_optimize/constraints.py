@@ -27,12 +27,8 @@ def contradicting(rows: Array, limits: Array, equal: NDArray[np.bool_]) -> list[
     """Return the numbers of rows that leave no point together, though every part of them does.
 
     The rows with a multiplier in the least sum of violations cannot be met together; of these each one
-    without which the others still contradict each other is dropped.
-
-    `rows`: C of C x ≤ c, shape (m, n); `limits`: c, shape (m,); `equal`: marks of rows that hold as
-    equations, shape (m,).
-
-    Returns numbers in ascending order; empty where all can be met.
+    without which the others still contradict each other is dropped. Returns numbers in ascending order; empty
+    where all can be met.
 
     References:
         J. W. Chinneck, Feasibility and infeasibility in optimization, Springer, 2008 (elastic and deletion
@@ -122,11 +118,8 @@ class LinearConstraints:
 class Surroundings:
     """The feasible set seen from a point x, for a step y in scaled variables (x + scale·y).
 
-    Attributes:
-        rows: C of C y ≤ room, shape (m, n), every row of length one.
-        room: Distance to each row, shape (m,); negative where x violates it.
-        equality_rows: E of E y = miss, shape (r, n), every row of length one.
-        miss: Signed distance to each equality, shape (r,).
+    `rows`: C of C y ≤ room, every row of length one; `room`: distance to each row; negative where x violates
+    it; `equality_rows`: E of E y = miss, every row of length one; `miss`: signed distance to each equality.
     """
 
     rows: Array
@@ -138,16 +131,7 @@ class Surroundings:
 @displayed
 @dataclass(frozen=True)
 class FeasibleSet:
-    """{x : lower ≤ x ≤ upper, A x ≤ b, E x = e}, checked and complete (empty where there is no constraint).
-
-    Attributes:
-        lower: Shape (n,), -inf where free.
-        upper: Shape (n,), inf where free.
-        matrix: A, shape (m, n).
-        limit: b, shape (m,).
-        equality_matrix: E, shape (r, n).
-        equality_value: e, shape (r,).
-    """
+    """{x : lower ≤ x ≤ upper, A x ≤ b, E x = e}, checked and complete (empty where unconstrained)."""
 
     lower: Array
     upper: Array
@@ -157,14 +141,7 @@ class FeasibleSet:
     equality_value: Array
 
     def violations(self, x: Array) -> list[str]:
-        """Name every bound and row that x violates, with the amount.
-
-        Args:
-            x: Point, shape (n,).
-
-        Returns:
-            One phrase for each violation; empty where x is feasible.
-        """
+        """Name every bound and row that x violates, with the amount."""
         messages = []
         given = [np.where(np.isfinite(each), np.abs(each), 0.0) for each in (x, self.lower, self.upper)]
         size = np.max(given, axis=0, initial=0.0)
@@ -218,15 +195,7 @@ class FeasibleSet:
         return f": {', '.join(found)}" if found else ""
 
     def around(self, x: Array, scale: Array) -> Surroundings:
-        """Return the constraints on a step y from x in scaled variables.
-
-        Args:
-            x: Point, shape (n,).
-            scale: Size of each variable, shape (n,), positive.
-
-        Returns:
-            Rows of length one and the distance to each.
-        """
+        """Return the constraints on a step y from x in scaled variables."""
         unit = np.eye(x.size)
         below, above = (x - self.lower) / scale, (self.upper - x) / scale
         fixed = self.lower == self.upper
@@ -254,10 +223,7 @@ def feasible_set(
     bounds: Box | None = None,
     constraints: Constraints | None = None,
 ) -> FeasibleSet:
-    """Check the caller's constraints and fill in the defaults.
-
-    Returns the feasible set; the caller's arrays are copied.
-    """
+    """Check the caller's constraints and fill in the defaults."""
     lower, upper = _box(n, bounds)
     given = [] if constraints is None else constraints
     parts = [_checked_rows(n, one) for one in (given if isinstance(given, list | tuple) else [given])]

@@ -143,10 +143,7 @@ def fixed_rim(design: Net, width: int | Sequence[int] = 1) -> LinearConstraints:
 
 
 def joined(designs: Sequence[Net], *parts: tuple[int, LinearConstraints]) -> LinearConstraints:
-    """Place constraints of single designs in the variables of all.
-
-    `designs`: all designs in the order of their variables: ``ShapeProblem.designs``.
-    """
+    """Place constraints of single designs in the variables of all."""
     ends = np.cumsum([0, *(np.prod(design.counts, dtype=int) for design in designs)])
     matrices: dict[str, list[Array]] = {"rows": [np.zeros((0, ends[-1]))], "equal": [np.zeros((0, ends[-1]))]}
     limits: dict[str, list[Array]] = {"rows": [np.zeros(0)], "equal": [np.zeros(0)]}

@@ -70,10 +70,7 @@ def merit_planes(problem: PosedProblem, evaluation: Evaluation) -> list[Plane]:
 def with_pieces(
     bundle: Bundle, problem: PosedProblem, evaluation: Evaluation, centre: float, move: Array
 ) -> Bundle:
-    """Return the bundle with the planes of other functions of which J is the largest, see `Pieced`.
-
-    `move`: the step from there to the trial point, shape (n,), scaled variables.
-    """
+    """Return the bundle with the planes of other functions of which J is the largest, see `Pieced`."""
     for value, slope in zip(map(float, evaluation.pieces), evaluation.piece_slopes, strict=True):
         plane = merit_planes(problem, replace(evaluation, value=value, subgradient=slope))[0]
         error, length = float(plane.gradient @ move) - (value - centre), float(np.linalg.norm(move))
@@ -223,10 +220,7 @@ def neighbour(problem: PosedProblem, x: Array, *, distance: float = 1e-2, attemp
     """Return a feasible point near x in a random direction, the same one for the same x.
 
     Steps that leave the box are reflected into it; of several points the one furthest from x is taken, x
-    itself where no other is feasible.
-
-    `distance`: length of the steps, in lengths of the problem; `attempts`: directions that are tried until
-    one yields half that distance.
+    itself where no other is feasible. `distance`: length of the steps, in lengths of the problem.
     """
     allowed, scale = problem.allowed, problem.scale
     below, above = (allowed.lower - x) / scale, (allowed.upper - x) / scale
@@ -254,8 +248,6 @@ def restored(
     """Return the point near x that meets the equalities, bounds and linear constraints, by Newton's method.
 
     Every correction is the shortest one, in scaled variables, to the linearised equalities.
-
-    `x`: point that satisfies bounds and linear constraints, shape (n,).
     """
     equal = problem.equalities
     if not equal:

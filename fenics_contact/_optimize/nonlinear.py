@@ -140,10 +140,9 @@ def _component(given: Any, k: int, x: Array) -> tuple[float, Array]:
 class ConstraintValue:
     """A nonlinear constraint at the best point.
 
-    Attributes:
-        violation: How far c lies outside its limits, divided by its size; 0 inside.
-        multiplier: m of the stationarity ∇J + Σ m ∇c = 0, positive at an upper limit, negative at a lower
-            one: a small change δ of that limit changes the least J by about -m δ. 0 where it is inactive.
+    `violation`: how far c lies outside its limits, divided by its size; 0 inside; `multiplier`: m of the
+    stationarity ∇J + Σ m ∇c = 0, positive at an upper limit, negative at a lower one: a small change δ of
+    that limit changes the least J by about -m δ. 0 where it is inactive.
     """
 
     name: str
@@ -178,10 +177,7 @@ class ConstraintValue:
 class Scaled:
     """Nonlinear constraints at a point, divided by their sizes.
 
-    Attributes:
-        excess: (c - limit)/size, shape (k,), positive where an inequality is violated.
-        factors: Its derivatives by c, shape (k,).
-        equal: Marks of equalities, shape (k,).
+    `excess`: (c - limit)/size, positive where an inequality is violated; `factors`: its derivatives by c.
     """
 
     excess: Array
@@ -200,10 +196,7 @@ class Scaled:
 
 
 def scaled_constraints(constraints: Sequence[NonlinearConstraint], values: Array) -> Scaled:
-    """Return constraints in units of their sizes.
-
-    `values`: their values c, shape (k,).
-    """
+    """Return constraints in units of their sizes."""
     pairs = [constraint.excess(float(value)) for constraint, value in zip(constraints, values, strict=True)]
     excess, factors = np.array(pairs, dtype=float).reshape(-1, 2).T
     return Scaled(excess, factors, np.array([one.equality for one in constraints], dtype=bool))
@@ -213,10 +206,9 @@ def scaled_constraints(constraints: Sequence[NonlinearConstraint], values: Array
 class Rise:
     """What a trial point says of a penalty ρ max(c, 0), units of J.
 
-    Attributes:
-        change: Its change from the centre to the trial point.
-        slope: ρ a·y where c > 0 at the trial point, else 0, with the subgradient a there.
-        predicted: Its change at the trial point as the new plane predicts it.
+    `change`: its change from the centre to the trial point; `slope`: ρ a·y where c > 0 at the trial point,
+    else 0, with the subgradient a there; `predicted`: its change at the trial point as the new plane predicts
+    it.
     """
 
     change: float = 0.0
@@ -228,9 +220,8 @@ class Rise:
 class SoftConstraint:
     """c(x) ≤ 0 as ρ max(c(x), 0) in the merit function, and as rows with a slack in the step's programme.
 
-    Attributes:
-        bundle: Cutting planes of c at the centre, with their own linearisation errors.
-        value: c at the centre, divided by the size of the constraint.
+    `bundle`: cutting planes of c at the centre, with their own linearisation errors; `value`: c at the
+    centre, divided by the size of the constraint.
     """
 
     bundle: Bundle
@@ -271,10 +262,7 @@ class SoftConstraint:
         return replace(self, penalty=min(factor * self.penalty, self._most))
 
     def with_cut(self, plane: Plane, move: Array) -> tuple[SoftConstraint, Rise]:
-        """Return the constraint with the plane of a trial point at the end, and what the point says.
-
-        `move`: the step to it, shape (n,), scaled variables.
-        """
+        """Return the constraint with the plane of a trial point at the end, and what the point says."""
         value, slope = plane.value, float(plane.gradient @ move)
         error, length = slope - (value - self.value), float(np.linalg.norm(move))
         bundle = self.bundle.with_cut(plane, error, length)

@@ -35,10 +35,7 @@ class Inexact(Function, Protocol):
         """Whether `within` can save anything; else it is not called."""
 
     def within(self, x: Array, value: float, subgradient: float) -> tuple[float, ArrayLike, float]:
-        """Return the value, a subgradient, and the estimated error of the value.
-
-        `x`: point, shape (n,).
-        """
+        """Return the value, a subgradient, and the estimated error of the value."""
 
 
 @runtime_checkable
@@ -69,10 +66,7 @@ class Remarked(Function, Protocol):
     """A function with remarks on a point; those on the last one are logged, once."""
 
     def remarks(self, x: Array) -> Sequence[str]:
-        """Return what to know about a point, in whole sentences; nothing if there is nothing.
-
-        `x`: point, shape (n,).
-        """
+        """Return what to know about a point, in whole sentences; nothing if there is nothing."""
 
 
 @runtime_checkable
@@ -105,18 +99,10 @@ class Accuracy:
 class Evaluation:
     """Value and subgradient at a point.
 
-    Attributes:
-        x: Point, shape (n,).
-        subgradient: One subgradient, shape (n,), in the caller's variables.
-        asked_value: Allowed error of the value, 0 for an exact function.
-        turned: Relative change of the subgradient since a less accurate evaluation of the same point: 0 for
-            an exact function, inf without such an evaluation.
-        doubtful: Whether it, or one of a constraint, may not be a subgradient, see `Kinked`.
-        constraints: Values c(x) of the nonlinear constraints, shape (k,).
-        slopes: Their subgradients, shape (k, n), in the caller's variables.
-        constraint_errors: Estimated errors of their values, shape (k,).
-        pieces: Values at x of other functions of which J is the largest, see `Pieced`, shape (p,).
-        piece_slopes: Their subgradients, shape (p, n), in the caller's variables.
+    `asked_value`: allowed error of the value, 0 for an exact function; `turned`: relative change of the
+    subgradient since a less accurate evaluation of the same point: 0 for an exact function, inf without such
+    an evaluation; `doubtful`: whether it, or one of a constraint, may not be a subgradient, see `Kinked`;
+    `pieces`: values at x of other functions of which J is the largest, see `Pieced`.
     """
 
     x: Array
@@ -142,11 +128,7 @@ def can_be_inexact(fun: Fun) -> bool:
 def evaluate(
     fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None, name: str = "fun"
 ) -> Evaluation:
-    """Call the function with a copy of x and check what it returns.
-
-    `x`: point, shape (n,); `accuracy`: accuracy requested from an inexact function; None for the best
-    possible.
-    """
+    """Call the function with a copy of x and check what it returns."""
     if accuracy is None or not (isinstance(fun, Inexact) and fun.inexact):
         evaluation = _checked(fun(x.copy()), x, f"at evaluation {number}", name)
     else:
@@ -211,10 +193,7 @@ def _checked(answer: Any, x: Array, where: str, name: str = "fun") -> Evaluation
 
 
 def require_finite(needed: str, numbers: Array, where: str) -> None:
-    """Refuse numbers that are not finite.
-
-    `numbers`: the numbers, of any shape.
-    """
+    """Refuse numbers that are not finite."""
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         raise InvalidInputError(

@@ -46,11 +46,8 @@ def evaluate_constraint(
 class PosedProblem:
     """min J(x) over a feasible set, checked.
 
-    Attributes:
-        start: Feasible starting point, shape (n,).
-        scale: Size of each variable, shape (n,): the method sees x/scale.
-        length: Length scale of the problem in scaled variables.
-        nonlinear: Nonlinear constraints, every one with a name.
+    `scale`: size of each variable: the method sees x/scale; `length`: length scale of the problem in scaled
+    variables.
     """
 
     fun: Fun
@@ -171,11 +168,9 @@ class Demand:
     A trial is assessed by the difference of two values, a step of length ℓ by a subgradient. Errors of J must
     stay below share · w and those of the subgradient below part · w/ℓ, with w the predicted decrease or,
     where that is larger, the decrease that is not worth a step. No trial that raises J then becomes the
-    centre, as long as twice the share is less than the ``descent`` of the method.
-
-    Attributes:
-        headroom: Factor on the sufficient accuracy that is requested: not every step re-evaluates the centre.
-        confirm: An unconfirmed centre is evaluated with errors smaller by this factor.
+    centre, as long as twice the share is less than the ``descent`` of the method. `headroom`: factor on the
+    sufficient accuracy that is requested: not every step re-evaluates the centre; `confirm`: an unconfirmed
+    centre is evaluated with errors smaller by this factor.
 
     References:
         K. C. Kiwiel, A proximal bundle method with approximate subgradient linearizations, SIAM J. Optim. 16

@@ -75,11 +75,7 @@ class Method(Protocol):
 
 
 class Progress:
-    """Stores a minimisation in its checkpoint, if it has one, and reports its progress.
-
-    Attributes:
-        comm: Communicator on which the minimisation is replicated, None if unknown.
-    """
+    """Stores a minimisation in its checkpoint, if it has one, and reports its progress."""
 
     def __init__(
         self, checkpoint: Checkpoint | None, method: Method, problem: PosedProblem, callback: Callback | None

@@ -165,11 +165,8 @@ class NotConvergedError(ConvergenceError):
 class MethodState:
     """Everything that the next step of the method depends on.
 
-    Attributes:
-        history: One record for each evaluation, oldest first.
-        careful: Whether doubtful subgradients are replaced at once, see `fenics_contact._optimize.merit`.
-        soft: Nonlinear inequalities with their cutting planes and penalties.
-        multipliers: Multipliers of all nonlinear constraints that the last step predicted, shape (k,).
+    `careful`: whether doubtful subgradients are replaced at once, see `fenics_contact._optimize.merit`;
+    `multipliers`: multipliers of all nonlinear constraints that the last step predicted.
     """
 
     centre: Evaluation

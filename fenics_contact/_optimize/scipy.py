@@ -34,12 +34,8 @@ _SLOPE = 10.0  # of the wall around invalid designs, in scaled values over scale
 class Visit:
     """One evaluation.
 
-    Attributes:
-        x: Design, shape (n,), in the caller's variables.
-        value: J there; nan where it does not exist.
-        violation: Distance by which x leaves bounds and linear constraints, in scaled variables, or violation
-            of a nonlinear constraint over its size, whichever is larger; 0 inside.
-        note: Why J does not exist; empty if it does.
+    `violation`: distance by which x leaves bounds and linear constraints, in scaled variables, or violation
+    of a nonlinear constraint over its size, whichever is larger; 0 inside.
     """
 
     x: Array

@@ -31,18 +31,12 @@ _LOG = logging.getLogger(__name__)
 class Step:
     """Solution of the step's programme, in scaled variables.
 
-    Attributes:
-        move: y, shape (n,).
-        decrease: Predicted decrease w = -max_i (g_i·y - β_i) of J, not negative; with nonlinear constraints
-            that of J + Σ ρ_k max(c_k, 0).
-        weights: Multipliers of the cutting planes, shape (m,), not negative, sum one.
-        aggregate_norm: ‖z‖ = ‖y‖/t, length of the aggregate subgradient (with the constraints' normals).
-        aggregate_error: σ = Σ λ_i β_i + Σ μ_k room_k, and Σ_ki θ_ki ρ_k (β_ki - c_k) + Σ_k ρ_k max(c_k, 0);
-            w = σ + t ‖z‖².
-        soft_weights: Multipliers θ_ki of the planes of each nonlinear inequality in units of its penalty.
-        violations: Predicted max(c_k, 0) after the move.
-        equality_multipliers: Multipliers of the rows of E, shape (r,).
-        stuck: Whether no penalty makes a step reduce the violations.
+    `decrease`: predicted decrease w = -max_i (g_i·y - β_i) of J, not negative; with nonlinear constraints
+    that of J + Σ ρ_k max(c_k, 0); `aggregate_norm`: ‖z‖ = ‖y‖/t, length of the aggregate subgradient (with
+    the constraints' normals); `aggregate_error`: σ = Σ λ_i β_i + Σ μ_k room_k, and Σ_ki θ_ki ρ_k (β_ki - c_k)
+    + Σ_k ρ_k max(c_k, 0); w = σ + t ‖z‖²; `soft_weights`: multipliers θ_ki of the planes of each nonlinear
+    inequality in units of its penalty; `violations`: predicted max(c_k, 0) after the move; `stuck`: whether
+    no penalty makes a step reduce the violations.
     """
 
     move: Array
@@ -64,11 +58,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Model:
-    """What the programme of a step knows of the problem at the centre.
-
-    Attributes:
-        near: Constraints around the centre, which satisfies them.
-    """
+    """What the programme of a step knows of the problem at the centre."""
 
     bundle: Bundle
     near: Surroundings
@@ -92,19 +82,17 @@ def solve_step(
     blurred: float = 1e-2,
     vanished: float = 1e-7,
 ) -> Step:
-    r"""Minimise v + Σ ρ_k s_k + ‖y‖²/(2t) subject to g_i·y - β_i ≤ v, C y ≤ room and E y = 0.
+    """Minimise v + Σ ρ_k s_k + ‖y‖²/(2t) subject to g_i·y - β_i ≤ v, C y ≤ room and E y = 0.
 
     Each nonlinear inequality adds c_k + a_ki·y - β_ki ≤ s_k for its planes, and s_k ≥ 0.
 
-    The programme is solved in units of its own solution, lengths in t γ and decreases in t γ², so
-    that objective and variables may have any size. γ is the length of a subgradient at first. Near a minimum
-    the aggregate z is much shorter than that and is lost in the solver's tolerance: then the programme is
-    solved again with γ = ‖z‖, without the planes that lie too deep to affect the solution, and the sharper
-    result is used if the solver reports success.
-
-    `sharpenings`: largest number of further solves; `blurred`: ‖z‖ in units of the programme below which a
-    further solve sharpens it; `vanished`: ‖z‖ relative to the longest subgradient below which it is rounding
-    and cannot be sharpened.
+    The programme is solved in units of its own solution, lengths in t γ and decreases in t γ², so that
+    objective and variables may have any size. γ is the length of a subgradient at first. Near a minimum the
+    aggregate z is much shorter than that and is lost in the solver's tolerance: then the programme is solved
+    again with γ = ‖z‖, without the planes that lie too deep to affect the solution, and the sharper result is
+    used if the solver reports success. `blurred`: ‖z‖ in units of the programme below which a further solve
+    sharpens it; `vanished`: ‖z‖ relative to the longest subgradient below which it is rounding and cannot be
+    sharpened.
 
     References:
         H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152, section 2.
@@ -228,11 +216,8 @@ def _step(model: Model, solution: QuadraticSolution, t: float, unit: float) -> S
 class Trial:
     """A trial step and the response of the objective.
 
-    Attributes:
-        change: J at the trial point minus J at the centre.
-        slope: g·y with the subgradient at the trial point.
-        measure: Locality measure β of the trial's plane, seen from the centre.
-        growth: Largest factor on t after one serious step.
+    `slope`: g·y with the subgradient at the trial point; `measure`: locality measure β of the trial's plane,
+    seen from the centre; `growth`: largest factor on t after one serious step.
     """
 
     growth: ClassVar[float] = 10.0
@@ -262,21 +247,17 @@ class Trust:
     """Proximal parameter and trust region with the counts that adapt them.
 
     A large t makes a long step. t follows the parabola that the predicted and the actual change define
-    [Kiwiel 1990], within the bracket of Schramm and Zowe: it grows after a step that descends as
-    predicted, and shrinks after one whose cutting plane says little about the centre. Unlike in their method,
-    a trial that descends is never discarded for a longer one: evaluations dominate the cost, so the step is
-    taken and the next one is longer.
+    [Kiwiel 1990], within the bracket of Schramm and Zowe: it grows after a step that descends as predicted,
+    and shrinks after one whose cutting plane says little about the centre. Unlike in their method, a trial
+    that descends is never discarded for a longer one: evaluations dominate the cost, so the step is taken and
+    the next one is longer.
 
-    The radius only guards against steps into regions where the objective does not exist.
-
-    Attributes:
-        t_least: Below it no descent can be expected.
-        radius_least: Below it the design practically cannot move.
-        streak: Consecutive serious steps after which t at least doubles.
-        shrinkage: Smallest and largest factor on t after a bad null step.
-        patience: Null steps that may be far off before t shrinks.
-        far: A null step is far off if its error exceeds this many predicted decreases.
-        cut: Fraction of the predicted decrease that a new plane must remove, else the step was too long.
+    The radius only guards against steps into regions where the objective does not exist. `t_least`: below it
+    no descent can be expected; `radius_least`: below it the design practically cannot move; `streak`:
+    consecutive serious steps after which t at least doubles; `shrinkage`: smallest and largest factor on t
+    after a bad null step; `patience`: null steps that may be far off before t shrinks; `far`: A null step is
+    far off if its error exceeds this many predicted decreases; `cut`: fraction of the predicted decrease that
+    a new plane must remove, else the step was too long.
 
     References:
         H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152, inner iteration of section 3.
