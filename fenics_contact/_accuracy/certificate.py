@@ -47,9 +47,8 @@ def nearest(
 
     whose gradient is e − G λ(α): a semismooth Newton method with as many unknowns as there are rigid motions.
     Where the cone has only one multiplier in equilibrium, α grows without bound while G λ − e tends to zero.
-    Norms are those of the scaled multipliers.
-
-    Returns within the cone, owned; in equilibrium unless there is no such multiplier.
+    Norms are those of the scaled multipliers. Returns within the cone, owned; in equilibrium unless there is
+    no such multiplier.
     """
     search = _Search(problem, feasible, start)
     point = search.at(np.zeros(problem.coarse.m))
@@ -138,11 +137,8 @@ ENDLESS = 1e300
 class Statuses:
     """Statuses of contact at a multiplier, and the rows that are free for them.
 
-    Attributes:
-        closed: Closed contacts, shape (n_contact,), owned.
-        stick: Sticking discs, shape (n_friction,), owned.
-        slip: Discs on the circle, shape (n_friction,), owned; the others are pinned (Ψ = 0).
-        directions: Multiplier whose friction forces give the directions, owned.
+    `slip`: discs on the circle, owned; the others are pinned (Ψ = 0); `directions`: multiplier whose friction
+    forces give the directions, owned.
     """
 
     problem: DualProblem
@@ -180,13 +176,10 @@ class Statuses:
 class Admissible:
     """An admissible multiplier of a Tresca problem.
 
-    Attributes:
-        multiplier: λ with λ_N ≥ 0, ‖τ‖ ≤ Ψ and G λ = e, owned.
-        slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one unless that
-            follows the normal forces of a solution and no multiplier within it balances the load: at a load
-            that friction only just resists this depends on the solver's tolerance. It is then raised to the
-            computed forces.
-        unbalanced: The remaining G λ − e, measured in multipliers, relative to ‖λ‖.
+    `slip_bound`: Ψ of the Tresca problem, owned. It is the given one unless that follows the normal forces of
+    a solution and no multiplier within it balances the load: at a load that friction only just resists this
+    depends on the solver's tolerance. It is then raised to the computed forces; `unbalanced`: the remaining G
+    λ − e, measured in multipliers, relative to ‖λ‖.
     """
 
     multiplier: Vector
@@ -202,11 +195,8 @@ def admissible(
 
     Where the map w = λ − ρ r of the solver indicates open contact, the normal force is set to zero, where it
     indicates slip, friction is set on its circle: a deficit there costs energy of first order, as gap and
-    slip are not small. Elsewhere λ is projected on the cone.
-
-    `slip_bound`: Ψ, shape (n_friction,), owned; `follows`: discs whose slip bound follows the normal force,
-    shape (n_friction,), owned. That of the others is given and not raised; `residual`: r = F λ − d − Gᵀα,
-    owned.
+    slip are not small. Elsewhere λ is projected on the cone. `follows`: discs whose slip bound follows the
+    normal force, owned. That of the others is given and not raised.
     """
     layout, step = problem.layout, contact_step(problem.layout, problem.diagonal)
     trial = multiplier - step * residual
@@ -251,10 +241,8 @@ def _balanced(
     The shortest change of the free multipliers restores equilibrium or, where these do not suffice, of all
     closed ones, or of all; the result is projected on the cone again. Neighbouring contact forces take part:
     gluing forces alone would carry the difference through the bodies, which bends thin ones. Forces across
-    open gaps come last, as each costs its gap in energy.
-
-    `rounds`: rounds of alternating projections on the cone and on equilibrium; `progress`: a round that
-    leaves more than this fraction of the imbalance makes no progress.
+    open gaps come last, as each costs its gap in energy. `progress`: a round that leaves more than this
+    fraction of the imbalance makes no progress.
     """
     problem, point = statuses.problem, feasible.project(start)
     left = _unbalanced(problem, point)
@@ -275,9 +263,7 @@ def basis(
 ) -> sp.csr_matrix:
     """Return Z of a face, see `fenics_contact.qp.face.face_basis`, by the directions of friction forces.
 
-    `closed`: contacts whose normal row is in it, shape (n_contact,); `stick`: discs of which both rows are in
-    it, shape (n_friction,); `turning`: discs of which the direction across the friction force is in it, shape
-    (n_friction,); `multiplier`: multiplier with the friction forces, owned.
+    `turning`: discs of which the direction across the friction force is in it.
     """
     tau = multiplier[layout.tangential]
     length = np.linalg.norm(tau, axis=1, keepdims=True)
@@ -304,13 +290,9 @@ UNLIFTED = 1e-9
 class Lifted:
     """A correction w of the interface after which all equality rows hold and no contact penetrates.
 
-    Attributes:
-        displacement: w, shape (n_interface,), [length].
-        energy: wᵀ S w, [force · length].
-        residual: r after it, owned, [length]; zero in the rows that were closed.
-        multiplier: Estimate −M r of the multiplier's error, owned, [force].
-        left: Remaining violation relative to the initial one; more than rounding only if rows are
-            contradictory.
+    `residual`: r after it, owned; zero in the rows that were closed; `multiplier`: estimate −M r of the
+    multiplier's error, owned; `left`: remaining violation relative to the initial one; more than rounding
+    only if rows are contradictory.
     """
 
     displacement: Vector
@@ -325,10 +307,8 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
 
     The correction is that of the Dirichlet preconditioner, w = D⁻¹Bᵀ(B D⁻¹Bᵀ)⁻¹ r, with its energy wᵀ S w:
     the preconditioned residual rᵀ M r. The effect of regularising the contact block is corrected at the cost
-    of that small block alone; S is applied once, for half an F-product.
-
-    `residual`: its r = F λ − d − Gᵀα, owned, [length]; `cancelled`: norm of the displacements that cancel in
-    r, [length].
+    of that small block alone; S is applied once, for half an F-product. `cancelled`: norm of the
+    displacements that cancel in r.
     """
     comm, tangential = system.problem.comm, system.problem.layout.tangential
     slid = np.linalg.norm(residual[tangential], axis=1)
@@ -359,10 +339,7 @@ class _Closing:
 
 
 def _close(rows: _Rows, residual: Vector, cancelled: float, refinements: int = 12) -> _Closing:
-    """Close rows, and those that penetrate afterwards. Collective; no application of S.
-
-    `refinements`: number of corrections for the regularisation of the contact block.
-    """
+    """Close rows, and those that penetrate afterwards. Collective; no application of S."""
     system = rows.system
     comm, w = system.problem.comm, np.zeros(len(system.inverse.interface))
     start = global_max(comm, np.abs(rows.wanted(residual)).max(initial=0.0))
@@ -385,10 +362,7 @@ def _close(rows: _Rows, residual: Vector, cancelled: float, refinements: int = 1
 class _Rows:
     """The rows that a correction closes: all equality rows and some of contacts.
 
-    Attributes:
-        closed: Contacts to close, shape (n_contact,), owned.
-        stick: Discs whose slip is removed, shape (n_friction,), owned.
-        across: Discs whose slip across the friction force is removed, shape (n_friction,), owned.
+    `across`: discs whose slip across the friction force is removed, owned.
     """
 
     system: DualSystem
@@ -421,12 +395,9 @@ class _Rows:
 class Certificate:
     """Bounds of the algebraic error of a state in energy norm, [√(force · length)].
 
-    Attributes:
-        bound: Upper bound of ‖u − u⋆‖, also for the continuous displacement of the fields; infinite if no
-            admissible pair was found.
-        moved: Its part due to making the multiplier admissible.
-        gap: J(v) − θ(λ) of the admissible pair, [force · length].
-        error: Estimated error of the state's multiplier, owned, [force].
+    `bound`: upper bound of ‖u − u⋆‖, also for the continuous displacement of the fields; infinite if no
+    admissible pair was found; `moved`: its part due to making the multiplier admissible; `gap`: J(v) − θ(λ)
+    of the admissible pair, [force · length]; `error`: estimated error of the state's multiplier, owned.
     """
 
     bound: float

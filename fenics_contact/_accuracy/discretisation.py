@@ -43,9 +43,8 @@ def moduli(forms: FormLibrary, material: Material, element: Element) -> np.ndarr
 
     A material only defines a bilinear form of displacements, and its stress may be any UFL. On a cell with
     the displacement g x it stores C g : g times the volume. Some materials resist displacements, too: that
-    contribution scales with the square of the cell size and is eliminated by two sizes.
-
-    The result has shape (dim², dim²), g_kj at index dim k + j, [force / length²].
+    contribution scales with the square of the cell size and is eliminated by two sizes. The result has shape
+    (dim², dim²), g_kj at index dim k + j, [force / length²].
     """
     parts, cell = Composition((material,)), element.cell
 
@@ -64,14 +63,7 @@ def moduli(forms: FormLibrary, material: Material, element: Element) -> np.ndarr
 def energy_of_difference(
     moduli: np.ndarray, cell_type: str, points: np.ndarray, displacement: np.ndarray, gradient: np.ndarray
 ) -> np.ndarray:
-    """Return ∫ C (g − ∇u) : (g − ∇u) over each of some cells of one material.
-
-    `moduli`: C from `moduli`, shape (dim², dim²), [force / length²]; `points`: coordinates of the nodes,
-    shape (n, nodes of a cell, dim), [length]; `displacement`: u at the nodes, shape (n, nodes of a cell,
-    dim), [length]; `gradient`: g at the nodes, (k, j) for ∂u_k/∂x_j, shape (n, nodes of a cell, dim, dim).
-
-    The result has shape (n,), [force · length].
-    """
+    """Return ∫ C (g − ∇u) : (g − ∇u) over each of some cells of one material."""
     cell = CELL_TYPES[cell_type]
     integrate = _over_simplices if cell.is_affine else _by_quadrature
     return integrate(moduli, cell, points, displacement, gradient)
@@ -107,12 +99,7 @@ def _by_quadrature(
 def _cell_gradients(
     points: np.ndarray, displacement: np.ndarray, slopes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return ∇u and the Jacobian determinant of cells at one point, shapes (n, dim, dim) and (n,).
-
-    `points`: coordinates of the nodes, shape (n, nodes of a cell, dim); `displacement`: u there, shape (n,
-    nodes of a cell, dim); `slopes`: gradients of the shape functions at the point, shape (nodes of a cell,
-    dim).
-    """
+    """Return ∇u and the Jacobian determinant of cells at one point, shapes (n, dim, dim) and (n,)."""
     jacobian = np.matmul(points.transpose(0, 2, 1), slopes)
     determinant, adjugate = determinants(jacobian), _adjugate(jacobian)
     along = np.matmul(displacement.transpose(0, 2, 1), slopes)
@@ -171,14 +158,7 @@ def energy_on_subdomain(
     displacement: np.ndarray,
     gradient: np.ndarray,
 ) -> np.ndarray:
-    """Return ∫ C (g − ∇u) : (g − ∇u) over every cell of a subdomain, as if all were of one material.
-
-    `blocks`: dolfinx's block of each node of some cells, shape (n, nodes of a cell); elsewhere the result is
-    undefined; `displacement`: u at these nodes, shape (n, nodes of a cell, dim), [length]; `gradient`: g
-    there, shape (n, nodes of a cell, dim, dim), dimensionless.
-
-    The result has shape (n_cells,), in the order of the subdomain's mesh, [force · length].
-    """
+    """Return ∫ C (g − ∇u) : (g − ∇u) over every cell of a subdomain, as if all were of one material."""
     space = subdomain.mesh.space
     mesh, width = space.mesh, subdomain.mesh.components
     _dolfinx.update_coordinates(mesh, subdomain.mesh.by_input_node(subdomain.points))
@@ -228,10 +208,7 @@ class DiscretisationError:
 
 
 def of_every_cell(comm: MPI.Comm, sizes: Mapping[str, int], own: OfCells, body: str) -> np.ndarray:
-    """Return the values of all cells of a body, shape (n_cells,), replicated. Collective.
-
-    `sizes`: numbers of cells of all bodies; `own`: this rank's cells and their values.
-    """
+    """Return the values of all cells of a body, shape (n_cells,), replicated. Collective."""
     if body not in sizes:
         raise InvalidInputError(
             f"body must be one of {sorted(sizes)}, got {body!r}: take a name of the scene"
@@ -255,9 +232,6 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
     resolve how strains vary across it: there the estimate may be a quarter of the error; for a body of one
     cell it is meaningless. Where a mesh locks completely, the error exceeds the displacement and the estimate
     does not follow. The geometry error of facets on a curved surface is not included.
-
-    `displacement`: this rank's torn displacement, shape (torn_size,), [length]: that of a state is
-    `State.conforming_displacement`. Where copies of a node differ, their mean is used.
     """
     scene, comm = torn.scene, torn.decomposition.comm
     energies = {name: CellEnergies(torn, body) for name, body in scene.bodies.items()}
@@ -275,9 +249,6 @@ def recovered_fields(
     torn: TornSystem, *fields: np.ndarray
 ) -> Iterator[tuple[Subdomain, list[tuple[np.ndarray, np.ndarray]]]]:
     """Yield each of this rank's subdomains with fields and their recovered gradients. Collective.
-
-    `fields`: torn fields of this rank, shape (torn_size,) each; where copies of a node differ, their mean is
-    used.
 
     Yields of each field its values at the nodes of the cells, shape (n_cells, nodes of a cell, dim), and the
     gradients there, shape (n_cells, nodes of a cell, dim, dim).
@@ -319,12 +290,8 @@ class Parts:
 class ErrorProducts:
     """Products in energy of the estimated errors of two fields on this rank's cells, by body.
 
-    Each is a pair of cells and values as of `Parts`.
-
-    Attributes:
-        first: ∫ C e : e, e the error of the first field's gradient.
-        second: The same of the second one.
-        product: ∫ C e₁ : e₂.
+    Each is a pair of cells and values as of `Parts`. `first`: ∫ C e : e, e the error of the first field's
+    gradient; `product`: ∫ C e₁ : e₂.
     """
 
     first: OfCells
@@ -383,12 +350,7 @@ class CellEnergies:
         gradient: np.ndarray,
         among: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Return ∫ C (g − ∇u) : (g − ∇u) over each cell of a subdomain, shape (n_cells,), [force · length].
-
-        `displacement`: u at the nodes of its cells, shape (n_cells, nodes of a cell, dim), [length];
-        `gradient`: g there, shape (n_cells, nodes of a cell, dim, dim), dimensionless; `among`: marks of the
-        body's cells for which it is wanted, zero for others; None for all.
-        """
+        """Return ∫ C (g − ∇u) : (g − ∇u) over each cell of a subdomain, shape (n_cells,)."""
         mesh, whole = subdomain.mesh, self._body.mesh
         nodes, kind = whole.cells[mesh.cells], self._body.material_of_cells[mesh.cells]
         result = np.zeros(len(nodes))

@@ -38,9 +38,6 @@ class Polynomials:
 
     The coefficient of a mixed derivative is √(number of its permutations) times it: the sum of squares is
     that of the full tensor of derivatives. Derivatives of the highest degree come last.
-
-    Attributes:
-        degree: Highest degree, at least 2.
     """
 
     dim: int
@@ -57,12 +54,7 @@ class Polynomials:
         return slice(self.count - len(self._indices(self.degree)), self.count)
 
     def values(self, away: np.ndarray) -> np.ndarray:
-        """Evaluate them: d_i, then ½ d_i², d_i d_j / √2, and so on.
-
-        `away`: differences of positions, shape (..., dim).
-
-        The result has shape (..., m).
-        """
+        """Evaluate them: d_i, then ½ d_i², d_i d_j / √2, and so on."""
         columns = []
         for degree in range(1, self.degree + 1):
             for index in self._indices(degree):
@@ -83,7 +75,7 @@ class Polynomials:
     def turned(self, tensors: np.ndarray, turn: np.ndarray) -> np.ndarray:
         """Return Σ t_i..j T_ia ... T_jb: highest derivatives by coordinates x of those by T x.
 
-        `tensors`: shape (n, dim, ..., dim, k); `turn`: T, shape (n, dim, dim).
+        `turn`: T.
         """
         for axis in range(1, self.degree + 1):
             front = np.moveaxis(tensors, axis, 1)
@@ -116,15 +108,9 @@ def _orders(index: tuple[int, ...]) -> int:
 class Sites:
     """The nodes of this rank's cells of one order, one site for every material that meets there.
 
-    Attributes:
-        node: Node of each site among those of all bodies, shape (n_sites,).
-        points: Coordinates, shape (n_sites, dim), [length].
-        sharing: Sites that other ranks hold as well.
-        neighbours: Number of this rank's cells of their material that two sites share, shape (n_sites,
-            n_sites), without diagonal.
-        of_cells: Number of a subdomain -> site of each node of its cells, as dolfinx orders the cells of its
-            mesh, nodes in the order of the body's mesh; shape (n_cells, nodes of a cell).
-        cells: Number of this rank's cells around each site, shape (n_sites,).
+    `sharing`: sites that other ranks hold as well; `neighbours`: number of this rank's cells of their
+    material that two sites share, without diagonal; `of_cells`: number of a subdomain -> site of each node of
+    its cells, as dolfinx orders the cells of its mesh, nodes in the order of the body's mesh.
     """
 
     order: int
@@ -187,10 +173,7 @@ CHUNK = 2_000_000
 class Moments:
     """Normal equations of the fits of some sites, in the coordinates of their patches.
 
-    Attributes:
-        rows: The sites, shape (n,).
-        matrix: Shape (n, m, m), its trace of order one, with m polynomials.
-        right: Shape (n, m, dim), [length].
+    `matrix`: shape (n, m, m), its trace of order one, with m polynomials.
     """
 
     rows: np.ndarray
@@ -207,13 +190,8 @@ class Patches:
     """The patches of all sites, each with coordinates in which it is isotropic.
 
     The nodes of a patch are those of the cells around the site that are of its material, each weighted by the
-    number of cells that it shares with the site.
-
-    Attributes:
-        turn: T of each site: a difference d of positions is T d in its own coordinates, shape (n_sites, dim,
-            dim), [1 / length].
-        weight: Sum of the weights of each patch, shape (n_sites,).
-        polynomials: The fitted polynomials, one degree higher than displacements.
+    number of cells that it shares with the site. `turn`: T of each site: a difference d of positions is T d
+    in its own coordinates, [1 / length]; `weight`: sum of the weights of each patch.
     """
 
     sites: Sites
@@ -227,10 +205,7 @@ class Patches:
         return int(self.turn.shape[1])
 
     def moments(self, displacement: np.ndarray) -> Iterator[Moments]:
-        """Yield the normal equations of all sites in chunks. Collective.
-
-        `displacement`: displacement of each site, shape (n_sites, dim), [length].
-        """
+        """Yield the normal equations of all sites in chunks. Collective."""
         shared = self.sites.sharing.shared
         alone = np.ones(self.sites.count, dtype=bool)
         alone[shared] = False
@@ -308,11 +283,8 @@ FIRM = {2: 0.2, 3: 0.02}
 def recovered_gradients(sites: Sites, displacement: np.ndarray, slight: float = 1e-5) -> np.ndarray:
     """Return the recovered displacement gradient at every site. Collective.
 
-    `displacement`: displacement of each site, shape (n_sites, components), [length]; `slight`: weight of the
-    highest derivatives relative to the moments of a patch, which are of order one: it affects only what the
-    patch leaves undetermined, which rounding would decide otherwise.
-
-    Returns ∂u_k/∂x_j as entry (k, j), shape (n_sites, components, dim), dimensionless.
+    `slight`: weight of the highest derivatives relative to the moments of a patch, which are of order one: it
+    affects only what the patch leaves undetermined, which rounding would decide otherwise.
     """
     patches = find_patches(sites)
     dim, penalty, highest = patches.dim, _penalty(patches), patches.polynomials.highest
@@ -336,9 +308,8 @@ def _ask_neighbours(
 ) -> None:
     """Refit undetermined sites with the highest derivatives of neighbours, layer by layer. Collective.
 
-    `doubt`: measure of how poorly each is determined, shape (n,); `coefficients`: coefficients of all sites,
-    which are overwritten, shape (n_sites, m, dim), [length]; `alike`: where no patch suffices, those within
-    this factor of the best are used.
+    `doubt`: measure of how poorly each is determined; `alike`: where no patch suffices, those within this
+    factor of the best are used.
     """
     comm = patches.sites.sharing.comm
     known = np.ones(patches.sites.count, dtype=bool)
@@ -355,12 +326,7 @@ def _ask_neighbours(
 
 
 def _fitted(patches: Patches, moments: Moments, derivatives: np.ndarray) -> np.ndarray:
-    """Refit with given highest derivatives where a patch leaves them undetermined.
-
-    `derivatives`: ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k), shape (n, dim, ..., dim, dim).
-
-    Returns coefficients, shape (n, m, dim), [length].
-    """
+    """Refit with given highest derivatives where a patch leaves them undetermined."""
     polynomials, back = patches.polynomials, np.linalg.inv(patches.turn[moments.rows])
     firm, right = FIRM[polynomials.degree], moments.right.copy()
     right[:, polynomials.highest] += firm * polynomials.coefficients_of(polynomials.turned(derivatives, back))
@@ -373,10 +339,6 @@ def _mean_of_neighbours(
     """Return whether sites have known neighbours, and the mean of these neighbours' highest derivatives.
 
     Collective.
-
-    `rows`: the sites, shape (n,); `known`: which sites are known, shape (n_sites,).
-
-    The result has shapes (n,) and (n, dim, ..., dim, dim): ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k).
     """
     sites, dim = patches.sites, patches.dim
     links = sites.neighbours[rows]

@@ -30,8 +30,6 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     the solution of Tresca's problem with the slip bounds of the certificate, to which that bound refers, to
     that of Coulomb's law, including the raise of slip bounds for the certificate. Zero where nothing slips,
     and where slip bounds do not follow the normal forces.
-
-    Returns energy norm of the change, [√(force · length)].
     """
     torn, layout, known = system.torn, system.problem.layout, certificate.known
     coefficient = torn.law.growth(solution.multiplier)
@@ -153,10 +151,7 @@ def solver_errors(system: DualSystem | DirectSystem, solution: DualSolution | Di
 
 
 def state_errors(solver: SolverErrors, estimate: DiscretisationError, norm: float) -> StateErrors:
-    """Combine the errors of a state.
-
-    `norm`: energy norm of the displacement, [√(force · length)].
-    """
+    """Combine the errors of a state."""
     by_body = {name: _ratio(value, norm) for name, value in estimate.by_body.items()}
     parts = (solver.algebraic, solver.friction, estimate.total)
     algebraic, friction, discretisation = (_ratio(part, norm) for part in parts)
