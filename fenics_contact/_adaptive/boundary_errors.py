@@ -38,12 +38,11 @@ def between_facets(
     """Return δL(w) − δa(u, w) + δJ by true shapes instead of facets, and the share of each cell. Collective.
 
     All nodes of a curved boundary move outwards along its normals by the mean height of the true surface
-    around them, which makes the volume the true one to first order. δ is the derivative along that motion,
-    of the work a of stresses, the work L of loads and what the objective itself depends on the shape, as far
-    as that is known. Gaps between true surfaces do not change. Nothing is done for quadratic cells, whose
-    facets are curved themselves.
-
-    `along`: the adjoint w, torn; `step`: part of the motion by which differences are taken.
+    around them, which makes the volume the true one to first order. δ is the derivative along that motion, of
+    the work a of stresses, the work L of loads and what the objective itself depends on the shape, as far as
+    that is known. Gaps between true surfaces do not change. Nothing is done for quadratic cells, whose facets
+    are curved themselves. `along`: the adjoint w, torn; `step`: part of the motion by which differences are
+    taken.
     """
     torn, parts, total = state.torn, Parts(state.scene.bodies), 0.0
     comm = torn.decomposition.comm

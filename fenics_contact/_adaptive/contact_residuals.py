@@ -25,12 +25,8 @@ from fenics_contact.shapes.simple import evaluate_shape
 class Places:
     """Points of quadrature on the true slave surface of a pair, on this rank's share of its facets.
 
-    Attributes:
-        points: Their coordinates, shape (n, dim), [length].
-        normal: Outward unit normals of the slave, shape (n, dim).
-        weight: The area that belongs to each, shape (n,), [length²] or [length].
-        height: How far the true surface lies above the facet, along the normal, shape (n,), [length].
-        values: Weights of the surface's nodes in fields, shape (n, n_nodes).
+    `weight`: the area that belongs to each; `height`: how far the true surface lies above the facet, along
+    the normal; `values`: weights of the surface's nodes in fields.
     """
 
     points: np.ndarray
@@ -101,11 +97,10 @@ def between_nodes(state: LinearState, multiplier: np.ndarray, opening: float) ->
 
     Contact holds at nodes, or as a mean: between them facets of one surface enter the other one, or leave
     gaps where the surfaces are curved. The function ζ interpolates forces per area, r the residuals at the
-    contact points; the gap g and the normal n are those of the true surfaces in each point.
-
-    `multiplier`: forces ζ of an adjoint, owned; `opening`: share of the gaps at open nodes that is not part
-    of r. The rim of the contact lies somewhere between closed and open nodes, and forces that do not vanish
-    there work on the gaps within it: half of them, on average.
+    contact points; the gap g and the normal n are those of the true surfaces in each point. `multiplier`:
+    forces ζ of an adjoint, owned; `opening`: share of the gaps at open nodes that is not part of r. The rim
+    of the contact lies somewhere between closed and open nodes, and forces that do not vanish there work on
+    the gaps within it: half of them, on average.
     """
     torn, total = state.torn, 0.0
     pressing, residual = (
@@ -153,9 +148,8 @@ def _along(
 
     The master's point straight ahead is the one nearest to where the tangential plane of the first one is
     met. Where contact on a roller is a quarter of its radius wide, gaps along the master's normals are off by
-    as much as the whole error of a good mesh, however fine that is.
-
-    `along`: from the master to the slave, of any length, shape (n, dim).
+    as much as the whole error of a good mesh, however fine that is. `along`: from the master to the slave, of
+    any length.
     """
     first = project(places.points, places.normal, master)
     normal = along[first.point] / np.linalg.norm(along[first.point], axis=1, keepdims=True)
@@ -170,10 +164,7 @@ def _along(
 def _opposite(
     state: LinearState, pair: ContactPair, places: Places, along: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return which points face the master, their gaps and normals, and how it moves there. Collective.
-
-    `along`: normals of the contact points, interpolated, shape (n, dim).
-    """
+    """Return which points face the master, their gaps and normals, and how it moves there. Collective."""
     torn, scene, field = state.torn, state.torn.scene, state.conforming_displacement
     decomposition = torn.decomposition
     tearing, comm = decomposition.tearing, decomposition.comm

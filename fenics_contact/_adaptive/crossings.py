@@ -20,11 +20,9 @@ def refined_at_crossings(found: SceneRefinement, halvings: int = 3) -> SceneRefi
     """Halve the cells around the crossings of plane bodies some more times.
 
     Displacements at a crossing grow with a small power α of the distance, by Young's moduli 100:1 with about
-    0.15, and halving the cells there leaves 2^(−2α) of the error, four fifths. Estimates see little of it,
-    as stresses next to it are even: where cells became smaller at the rate of others, what `solve_to` stated
-    was half of the error. A crossing is a node, and these cells are few.
-
-    `found`: the meshes; `halvings`: how often the cells around crossings are halved.
+    0.15, and halving the cells there leaves 2^(−2α) of the error, four fifths. Estimates see little of it, as
+    stresses next to it are even: where cells became smaller at the rate of others, what `solve_to` stated was
+    half of the error. A crossing is a node, and these cells are few.
     """
 
     def around(scene: Scene) -> Mapping[str, np.ndarray]:
@@ -36,9 +34,8 @@ def refined_at_crossings(found: SceneRefinement, halvings: int = 3) -> SceneRefi
 def around_crossings(body: Body, supports: Sequence[AnySupport] = (), finest: float = 1e-7) -> np.ndarray:
     """Return the cells around the crossings of a body, see `Crossings`.
 
-    None of quadratic quadrilaterals, which are halved all together.
-
-    `supports`: those of the body; `finest`: width of cells that are not halved any more, relative to it.
+    None of quadratic quadrilaterals, which are halved all together. `finest`: width of cells that are not
+    halved any more, relative to it.
     """
     mesh = body.mesh
     if mesh.order > 1 and not CELL_TYPES[mesh.cell_type].is_simplex:
@@ -82,14 +79,11 @@ class Crossings:
     """Nodes of a plane body around which stiff and soft sectors alternate.
 
     Fixed surfaces are rigid sectors, free ones soft: where a support ends at a soft material, and a stiff one
-    begins there, both are held together by the material next to that node alone.
-
-    Attributes:
-        nodes: The nodes, shape (n,).
-        exponents: For each the least α > 0 for which r^α φ(θ) with the power of the distance r solves
-            ∇·(E ∇u) = 0 around it, with Young's modulus E, u = 0 on fixed surfaces and no flux through free
-            ones: (4/π) arctan(1/√c) where four squares with the moduli 1:c alternate. Displacements of plane
-            elasticity grow with a similar power. Shape (n,).
+    begins there, both are held together by the material next to that node alone. `exponents`: for each the
+    least α > 0 for which r^α φ(θ) with the power of the distance r solves ∇·(E ∇u) = 0 around it, with
+    Young's modulus E, u = 0 on fixed surfaces and no flux through free ones: (4/π) arctan(1/√c) where four
+    squares with the moduli 1:c alternate. Displacements of plane elasticity grow with a similar power. Shape
+    (n,).
     """
 
     nodes: np.ndarray
@@ -99,8 +93,8 @@ class Crossings:
     def of(cls, body: Body, supports: Sequence[AnySupport], largest: float = 0.39) -> Crossings:
         """Return those of a body: none in space, where they are lines, or of materials without E.
 
-        `supports`: those of the body; `largest`: exponent above which a node is none, that of four squares
-        with the moduli 1:10. Estimates see the errors of others, as of corners.
+        `largest`: exponent above which a node is none, that of four squares with the moduli 1:10. Estimates
+        see the errors of others, as of corners.
         """
         constants = [isotropic_constants(material) for material in body.materials]
         if body.mesh.dim != 2 or len(constants) < 2 or None in constants:
@@ -119,9 +113,7 @@ def _candidates(edges: np.ndarray, stiffness: np.ndarray, contrast: float = 2.0)
     """Return the nodes of several materials in which more than two edges between them meet.
 
     Edges of one cell alone count, too: they lie on the boundary, or smaller cells are on the other side.
-
-    `edges`: of each cell, (n_cells, n_edges, 2); `stiffness`: of each cell; `contrast`: least ratio of the
-    stiffness on both sides of an edge, and around a node.
+    `contrast`: least ratio of the stiffness on both sides of an edge, and around a node.
     """
     ends, of_edges = np.sort(edges.reshape(-1, 2), axis=1), np.repeat(stiffness, edges.shape[1])
     alike, number = np.unique(ends, axis=0, return_inverse=True)
@@ -170,8 +162,7 @@ def _eigenvalues(
 ) -> np.ndarray:
     """Return all α² of −(E φ')' = α² E φ around a node, by quadratic elements, ascending.
 
-    `sectors`: angles at the sides of each, (n, 2); `stiffness`: E of each, (n,); `held`: angles at which φ is
-    zero; `turn`: angles that differ by less than this part of a turn are one.
+    `turn`: angles that differ by less than this part of a turn are one.
     """
     width = np.abs((np.diff(sectors, axis=1)[:, 0] + np.pi) % (2.0 * np.pi) - np.pi)
     whole, held = (np.round(each / (2.0 * np.pi) * turn).astype(int) % turn for each in (sectors, held))

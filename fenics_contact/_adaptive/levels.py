@@ -335,9 +335,8 @@ class Way:
         larger. Where materials cross, more may be missing, see `_missed_at_crossings`. As η may be wrong as a
         whole, it counts once. Without adjoint η is zero, and r that of the two changes where that is larger.
         A mesh without estimate was refined at a spot alone, and its change says nothing of the others: three
-        meshes with estimates are needed. An error above the value itself is none.
-        `missing`: η; `value`: J + η; `least`, `most`: bounds of r, half of errors are left where cells are
-        halved.
+        meshes with estimates are needed. An error above the value itself is none. `missing`: η; `value`: J +
+        η; `least`, `most`: bounds of r, half of errors are left where cells are halved.
         """
         changes = np.abs(np.diff(self._corrected[-3:]))
         if len(changes) < 2 or np.isnan(changes).any():
@@ -359,8 +358,6 @@ class Way:
         What is missed there falls by a known ratio from mesh to mesh, see `left_at_crossings`, and not faster
         even if the last meshes look so: the changes are those of a geometric series whose ratio may be 0.9.
         Once the cells there are not halved any more, what they miss stays.
-
-        `changes`: the last two.
         """
         sizes = self._near_crossings[-3:]
         falls = zip(changes.tolist(), pairwise(sizes), strict=False)

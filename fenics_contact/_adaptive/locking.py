@@ -24,9 +24,7 @@ def locks(body: Body, most: float = 100.0) -> bool:
     """Return whether linear cells of a body keep their volume at each point, so that they hardly deform.
 
     Plates in plane stress do not, as they become thicker; materials without Poisson's ratio count as ones
-    that do not.
-
-    `most`: ratio of bulk and shear modulus above which they do, ν = 0.495.
+    that do not. `most`: ratio of bulk and shear modulus above which they do, ν = 0.495.
     """
     if body.mesh.order > 1:
         return False

@@ -12,15 +12,7 @@ def bulk(shares: Mapping[str, np.ndarray], fraction: float, most: float = 1.0) -
 
     Cells with equal shares are all taken or none, so that the numbering of cells and rounding decide nothing.
     Source: W. Dörfler, A convergent adaptive algorithm for Poisson's equation, SIAM J. Numer. Anal. 33 (1996)
-    1106-1124.
-
-    Args:
-        shares: Body name -> share of each cell, ≥ 0, shape (n_cells,).
-        fraction: Fraction of the sum, between 0 and 1.
-        most: Largest part of the cells to mark, between 0 and 1, up to ties.
-
-    Returns:
-        Body name -> ascending numbers of marked cells, of bodies that have some.
+    1106-1124. `most`: largest part of the cells to mark, between 0 and 1, up to ties.
     """
     every = np.sort(np.concatenate(list(shares.values())))[::-1]
     held = np.cumsum(every)

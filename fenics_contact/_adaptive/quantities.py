@@ -30,8 +30,7 @@ from fenics_contact.errors import InvalidInputError
 class _Where:
     """What was given with a name.
 
-    Attributes:
-        radius: That of a mean near a place, [length]; by default a fraction of the body's size.
+    `radius`: that of a mean near a place; by default a fraction of the body's size.
     """
 
     scene: Scene

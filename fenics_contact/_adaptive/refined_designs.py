@@ -40,8 +40,6 @@ def refined_design(
 
     Parameters and directions of new nodes are interpolated by the shape functions of their coarse facets, so
     that a variable moves the surface along the same normals by the same polynomial of the same parameters.
-
-    `design`: the design with its nodes; `before`: the mesh of its body; `refinement`: None if that is kept.
     """
     if refinement is None:
         return design

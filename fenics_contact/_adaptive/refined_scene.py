@@ -21,19 +21,14 @@ from fenics_contact.mesh.refinement import Refinement, halves_together, refined
 class SceneRefinement:
     """A scene on refined meshes, and where their cells come from.
 
-    Attributes:
-        scene: The scene.
-        refinements: Body name -> its refinement. Bodies that kept their mesh are left out.
+    `refinements`: body name -> its refinement. Bodies that kept their mesh are left out.
     """
 
     scene: Scene
     refinements: Mapping[str, Refinement]
 
     def after(self, first: SceneRefinement) -> SceneRefinement:
-        """Return the scene with refinements that lead from the meshes before another refinement.
-
-        `first`: the one whose scene this one refines.
-        """
+        """Return the scene with refinements that lead from the meshes before another refinement."""
         both = dict(first.refinements)
         for name, found in self.refinements.items():
             both[name] = found.after(both[name]) if name in both else found
@@ -72,10 +67,7 @@ def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefineme
 def refined_again(
     found: SceneRefinement, marked: Callable[[Scene], Mapping[str, np.ndarray]], halvings: int
 ) -> SceneRefinement:
-    """Halve some cells of refined meshes some more times, as long as there are some.
-
-    `marked`: returns the cells of the bodies of a scene to halve; `halvings`: how often at most.
-    """
+    """Halve some cells of refined meshes some more times, as long as there are some."""
     for _ in range(halvings):
         cells = {name: each for name, each in marked(found.scene).items() if len(each)}
         if not cells:

@@ -28,10 +28,6 @@ class PairForce(Weighable):
     """J = d · Σ (n_i λ_i − t_i τ_i), the force of a contact pair on its slave along a direction, [force].
 
     Without derivatives by the shape.
-
-    Attributes:
-        pair: Number of the contact pair in the scene.
-        direction: d, of any length: it is divided by it.
     """
 
     can_be_infinite = False
@@ -66,11 +62,6 @@ class SupportForce(Weighable):
 
     With the part V of the virtual displacement d that the supports hold it is R·d = V·(−Bᵀλ), less what
     contacts and ties exert there: a linear function of the multipliers. Without derivatives by the shape.
-
-    Attributes:
-        body: Name of the body.
-        surface: Name of the supported surface.
-        direction: d, of any length: it is divided by it.
     """
 
     can_be_infinite = False
@@ -80,11 +71,7 @@ class SupportForce(Weighable):
     direction: GivenVector
 
     def value(self, state: State, forms: ShapeForms) -> float:
-        """Return the force. Collective.
-
-        Raises:
-            InvalidInputError: If no support holds the surface, or the body is a rigid tool.
-        """
+        """Return the force. Collective."""
         along, reactions = self._along(state), state.reactions()
         return float(sum(reactions[number].force @ along for number in self._numbers(state)))
 
@@ -167,11 +154,7 @@ class _AreaOfStatuses(Weighable):
 @dataclass(frozen=True)
 @checked()
 class TouchingArea(_AreaOfStatuses):
-    """J, the area in which surfaces touch, see `fenics_contact.contact_area`; no derivatives.
-
-    Attributes:
-        pair: Number of the contact pair in the scene; None for the sum of all.
-    """
+    """J, the area in which surfaces touch, see `fenics_contact.contact_area`; no derivatives."""
 
     pair: int | None = None
 
@@ -188,11 +171,7 @@ class TouchingArea(_AreaOfStatuses):
 @dataclass(frozen=True)
 @checked()
 class StickArea(_AreaOfStatuses):
-    """J, the area of a pair that sticks, see `fenics_contact.results.area.stick_area`; no derivatives.
-
-    Attributes:
-        pair: Number of the contact pair in the scene.
-    """
+    """J, the area of a pair that sticks, see `fenics_contact.results.area.stick_area`; no derivatives."""
 
     pair: int
 

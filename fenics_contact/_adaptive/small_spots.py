@@ -41,15 +41,8 @@ def refined_at_spots(
     """Halve the cells at the spots of some contact pairs until a spot is wider than they are.
 
     Where but one facet presses and Hertz's theory gives the size of the spot under the force that it
-    transmits, cells are halved until so many lie across its half width; else once.
-
-    Args:
-        state: The state on the meshes to refine.
-        pairs: Numbers of the pairs.
-        across: Number of cells.
-        most: How often cells are halved at most.
-        scene: The scene in another shape, with the same cells, that is refined in place of the state's.
-        refine: What halves cells.
+    transmits, cells are halved until so many lie across its half width; else once. `across`: number of cells;
+    `scene`: the scene in another shape, with the same cells, that is refined in place of the state's.
     """
     scene = state.scene if scene is None else scene
     spots = [_Spot.of(state, number, scene) for number in pairs]
@@ -74,10 +67,8 @@ def refined_at_spots(
 class _Spot:
     """Where a pair presses.
 
-    Attributes:
-        bodies: Names of the bodies whose cells meet there.
-        points: Places of the points that press, or of the one that comes nearest, shape (n, dim), [length].
-        half_width: Half the width of the spot, zero where it is not known, [length].
+    `points`: places of the points that press, or of the one that comes nearest; `half_width`: half the width
+    of the spot, zero where it is not known.
     """
 
     bodies: tuple[str, ...]
@@ -102,7 +93,7 @@ class _Spot:
 def cells_at(mesh: BodyMesh, places: np.ndarray, wide: float, around: float = 0.0) -> np.ndarray:
     """Return the cells that may reach some places and are wider than some length.
 
-    `places`: shape (n, dim), [length]; `around`: how far from a place they may lie.
+    `around`: how far from a place they may lie.
     """
     corners = mesh.points[mesh.cells]
     middle = corners.mean(axis=1)
@@ -113,10 +104,7 @@ def cells_at(mesh: BodyMesh, places: np.ndarray, wide: float, around: float = 0.
 
 
 def _half_width(state: State, number: int, places: np.ndarray) -> float:
-    """Return half the width by Hertz's theory of a pair of which one facet presses at most; zero if unknown.
-
-    `places`: places of the points of the pair, shape (n, dim), [length].
-    """
+    """Return half the width, by Hertz's theory, of a contact of one facet at most; zero if unknown."""
     contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
     mine, modulus = contact.on_pair(number), modulus_of(scene, pair)
     force = contact.normal_force[mine]

@@ -33,14 +33,9 @@ def refined_at_sticking_ends(
 
     Towards the corner of a body that presses, friction may need more and more of what the normal force
     allows. Then it slips there, in a zone far smaller than a cell, and estimates see nothing of that: the
-    node at the corner sticks. Work of friction was 14 % too small for such a zone of 0.2 % of the surface.
-    An end is a node, and these cells are few.
-
-    Args:
-        state: The state on the meshes before.
-        found: The meshes to refine.
-        halvings: How often the cells around ends are halved.
-        finest: Width of cells that are not halved any more, relative to the slave.
+    node at the corner sticks. Work of friction was 14 % too small for such a zone of 0.2 % of the surface. An
+    end is a node, and these cells are few. `finest`: width of cells that are not halved any more, relative to
+    the slave.
     """
     ends = {number: sticking_ends(state, number) for number in range(len(state.scene.contacts))}
 
@@ -62,9 +57,8 @@ def sticking_ends(state: State, number: int, most: float = 10.0) -> np.ndarray:
 
     There friction needs a share q of what the normal force allows, and p < q one node further inside. If q
     rises by q - p again with every halving of the cells, it is 1 after (1 - q) / (q - p) of them. None in
-    space, where ends are lines.
-
-    `most`: number of halvings, beyond which a zone of slip is too small to count.
+    space, where ends are lines. `most`: number of halvings, beyond which a zone of slip is too small to
+    count.
     """
     contact, scene = state.contact, state.scene
     pair = scene.contacts[number]

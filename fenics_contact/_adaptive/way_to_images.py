@@ -13,8 +13,8 @@ def way_to_images(mesh: BodyMesh) -> np.ndarray:
     """Return how nodes move so that facets enclose as much as the images by the chart, shape (n_nodes, dim).
 
     What is between a facet and the images is integrated as of quadratic facets through the images of its
-    middles (Simpson's rule), and divided among its corners; hanging nodes leave theirs to their masters.
-    Rims move as their edges do, in the plane not at all.
+    middles (Simpson's rule), and divided among its corners; hanging nodes leave theirs to their masters. Rims
+    move as their edges do, in the plane not at all.
     """
     chart = mesh.chart
     assert chart is not None
@@ -52,10 +52,7 @@ def way_to_images(mesh: BodyMesh) -> np.ndarray:
 
 
 def _rims(edges: np.ndarray, hanging: HangingNodes) -> np.ndarray:
-    """Return the edges of only one facet, shape (n, 2), but for those of larger facets that were halved.
-
-    `edges`: ends of those of all facets, shape (n_facets, 3 | 4, 2).
-    """
+    """Return the edges of only one facet, shape (n, 2), but for those of larger facets that were halved."""
     known, times = np.unique(np.sort(edges.reshape(-1, 2), axis=1), axis=0, return_counts=True)
     rim = known[times == 1]
     ends = np.unique(np.sort(hanging.masters, axis=1)[:, [0, -1]], axis=0)
