@@ -90,16 +90,11 @@ def relative_residuals(
 class Configuration:
     """A displacement with the forces and the histories of materials that belong to it.
 
-    Attributes:
-        displacement: u of this rank, torn, shape (torn_size,), [length].
-        multiplier: λ, owned, [force]; empty where nothing is known yet.
-        history: Internal variables of each of this rank's subdomains; None without any.
-        time: The time at which it was reached.
-        largest: Size of the largest displacement that there has been, as in `Residuals.gluing_scale`: where
-            bodies return to rest, residuals are relative to that.
-        contact: The contact points whose rows the multiplier has; None at the start.
-        diagonal: Of F on these rows, at a configuration near this one, owned; None where it is not known.
-        motions: U, then θ, of rigid surfaces; zero where they are not among them.
+    `multiplier`: λ, owned; empty where nothing is known yet; `largest`: size of the largest displacement that
+    there has been, as in `Residuals.gluing_scale`: where bodies return to rest, residuals are relative to
+    that; `diagonal`: of F on these rows, at a configuration near this one, owned; None where it is not known;
+    `motions`: U, then θ, of rigid surfaces; zero where they are not among them; `contact`: the contact points
+    whose rows the multiplier has; None at the start.
     """
 
     displacement: Vector
@@ -135,14 +130,10 @@ class Configuration:
 class ResidualState:
     """The equations at a configuration, under a load.
 
-    Attributes:
-        at: The configuration; its history and its time are those before the load step.
-        responses: Internal forces and tangents of this rank's subdomains.
-        external: f(u) of this rank, torn, [force].
-        softening: −∂f/∂u of this rank, torn; None where all loads are dead.
-        unbalanced: f(u) − f_int(u) − Bᵀλ of this rank, torn, [force].
-        constraint_residual: c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows.
-        least_jacobian: Smallest det F of all bodies; 1 where none is strained much.
+    `at`: the configuration; its history and its time are those before the load step; `softening`: −∂f/∂u of
+    this rank, torn; None where all loads are dead; `unbalanced`: f(u) − f_int(u) − Bᵀλ of this rank, torn;
+    `constraint_residual`: c − B u, owned: gaps, minus the slip, and openings of glued rows; `least_jacobian`:
+    smallest det F of all bodies; 1 where none is strained much.
     """
 
     equations: Equations
@@ -278,8 +269,7 @@ class ResidualState:
 class Linearisation:
     """Factored tangents, with rows for the stiffness of forces that turn with their surfaces.
 
-    Attributes:
-        system: The factored system; rows of turning forces come after all others.
+    `system`: the factored system; rows of turning forces come after all others.
     """
 
     system: TangentSystem
@@ -310,11 +300,7 @@ class Linearisation:
 
 @displayed
 class Equations:
-    """Internal forces of the bodies of a scene, whose meshes and numbering do not change, and their contact.
-
-    Attributes:
-        contact: How contact points are found: at undeformed places unless some body deforms much.
-    """
+    """Internal forces of the bodies of a scene, with fixed meshes and numbering, and their contact."""
 
     def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
         """Bind the forms of every subdomain, and prepare the surfaces of contact pairs. Collective."""

@@ -52,10 +52,9 @@ NO_EFFORT = Effort()
 class Snap:
     """A motion from one equilibrium to another one at the same load.
 
-    Attributes:
-        fraction: Part of the load step at which it took place, in (0, 1].
-        way: Largest distance by which a node moved, [length].
-        dissipated: Work against the drag, to first order in the steps of the motion, [force · length].
+    `fraction`: part of the load step at which it took place, in (0, 1]; `way`: largest distance by which a
+    node moved; `dissipated`: work against the drag, to first order in the steps of the motion, [force ·
+    length].
     """
 
     fraction: float
@@ -75,17 +74,12 @@ class Snap:
 class Stages:
     """Stages of a snap: how the drag α, relative to the stiffness of bodies, falls from one to the next.
 
-    Attributes:
-        first: First α.
-        more: Factor on α after a stage that failed.
-        less: The same after each of the first ``careful`` stages in a row that did not,
-        much_less: and after later ones.
-        careful: Number of those first ones.
-        tolerance: Tolerance of stages, which need not be exact.
-        tighter: Factor on it where bodies do not move at it, and on the drag before the next trial.
-        max_steps: Newton steps after which a stage counts as failed.
-        little: Drag, relative to all forces, below which an equilibrium is tried.
-        most: Largest number of stages, those that fail included.
+    `first`: first α; `more`: factor on α after a stage that failed; `less`: the same after each of the first
+    ``careful`` stages in a row that did not; `much_less`: and after later ones; `careful`: number of those
+    first ones; `tolerance`: tolerance of stages, which need not be exact; `tighter`: factor on it where
+    bodies do not move at it, and on the drag before the next trial; `max_steps`: Newton steps after which a
+    stage counts as failed; `little`: drag, relative to all forces, below which an equilibrium is tried;
+    `most`: largest number of stages, those that fail included.
     """
 
     first: float = 0.01
@@ -104,11 +98,8 @@ class Stages:
 class Motion:
     """Bodies on their way through the medium.
 
-    Attributes:
-        drag: α.
-        in_a_row: Number of stages since one failed.
-        tried: Drag, relative to all forces, when an equilibrium was tried last.
-        effort: That of all stages, those that failed included.
+    `tried`: drag, relative to all forces, when an equilibrium was tried last; `effort`: that of all stages,
+    those that failed included.
     """
 
     at: Configuration
@@ -126,12 +117,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Snapping:
-    """How bodies move on through the medium.
-
-    Attributes:
-        load: Returns what acts, with slip from a configuration and its system.
-        by: How the drag falls.
-    """
+    """How bodies move on through the medium."""
 
     newton: TangentNewton
     equations: Equations
@@ -190,16 +176,12 @@ class Snapping:
 class Path:
     """The equilibria from one load to the next.
 
-    Attributes:
-        begun: Contact points at the start; None where they are not known.
-        start: These in material coordinates of the master, of others where they were first found; None where
-            contact is that of the undeformed bodies.
-        fractions: Parts of the load at which equilibria were found, the last one being 1.
-        since: The part from which slip and the histories of materials are one step up to the end: 0, unless
-            parts are steps of their own or bodies snapped.
-        rubbed: Work of friction before the last step of histories, zero where the whole load is one,
-            [force · length].
-        effort: That of all parts, those that were cut included.
+    `start`: these in material coordinates of the master, of others where they were first found; None where
+    contact is that of the undeformed bodies; `fractions`: parts of the load at which equilibria were found,
+    the last one being 1; `since`: the part from which slip and the histories of materials are one step up to
+    the end: 0, unless parts are steps of their own or bodies snapped; `rubbed`: work of friction before the
+    last step of histories, zero where the whole load is one, [force · length]; `effort`: that of all parts,
+    those that were cut included.
     """
 
     load: Loading
@@ -216,8 +198,7 @@ class Path:
 class PathEndsError(ConvergenceError):
     """A load step that cannot be cut any further.
 
-    Attributes:
-        path: The way up to there; None if there is no equilibrium after the start.
+    `path`: the way up to there; None if there is no equilibrium after the start.
     """
 
     def __init__(self, message: str, history: Sequence[SolverStep], path: Path | None) -> None:
@@ -341,11 +322,8 @@ class AutomaticSteps:
 class Progress:
     """Equilibria found so far on the way to a load, and their cost.
 
-    Attributes:
-        at: Where the next one starts.
-        origin: Where the step of histories begins, with the system of then.
-        rubbed: Work of friction before that step.
-        ended: Whether the last equilibrium ends one.
+    `origin`: where the step of histories begins, with the system of then; `rubbed`: work of friction before
+    that step; `ended`: whether the last equilibrium ends one.
     """
 
     at: Configuration

@@ -36,15 +36,10 @@ from fenics_contact.qp.reductions import Vector
 class Loading:
     """What acts on the bodies at one time.
 
-    Attributes:
-        torn: The system with loads and supports; pressures that follow their surfaces act as on undeformed
-            ones.
-        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
-        following: Pressures that follow their surfaces, each with the part of them that acts.
-        course: A load step with functions of time; None without any.
-        drag: A viscous medium; None without any.
-        heat: Changes of temperature of this rank's subdomains by input node, None where materials feel none;
-            () where there are none.
+    `torn`: the system with loads and supports; pressures that follow their surfaces act as on undeformed
+    ones; `following`: pressures that follow their surfaces, each with the part of them that acts; `heat`:
+    changes of temperature of this rank's subdomains by input node, None where materials feel none; () where
+    there are none.
     """
 
     torn: TornSystem
@@ -271,9 +266,8 @@ def _change(load: ThermalStrain, points: np.ndarray) -> np.ndarray:
 class Drag:
     """A viscous medium, in which bodies move on where no equilibrium is near.
 
-    Attributes:
-        viscosity: By how much its forces grow with the way, of this rank, torn, [force / length].
-        origin: Displacement at which it exerts none, torn, shape (torn_size,), [length].
+    `viscosity`: by how much its forces grow with the way, of this rank, torn; `origin`: displacement at which
+    it exerts none, torn.
     """
 
     viscosity: Vector
@@ -382,9 +376,8 @@ class RigidStart:
         """Return the displacement after rigid motions of bodies whose supports all move as one.
 
         Supports hold whole nodes of such a body, and these move from one load to the other like those of a
-        rigid body, whose motion they determine.
-
-        Returns that of this rank, torn; None if no body moves like that.
+        rigid body, whose motion they determine. Returns that of this rank, torn; None if no body moves like
+        that.
         """
         copy, block = self._decomposition.held
         node, result = self._decomposition.tearing.copy_node[copy], None

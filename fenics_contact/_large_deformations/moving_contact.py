@@ -43,10 +43,7 @@ _NONE = np.zeros(0, dtype=np.int64)
 class UnevenStiffness:
     """An unsymmetric stiffness L Rᵀ of few columns.
 
-    Attributes:
-        left: L, shape (n_dofs, k); dof dim · node + component of all nodes.
-        right: R, shape (n_dofs, k), [force / length].
-        owner: Node whose rank owns the rows of a column, shape (k,).
+    `owner`: node whose rank owns the rows of a column.
     """
 
     left: sp.csr_matrix
@@ -59,11 +56,8 @@ class UnevenStiffness:
 class RowCorrections:
     """The differences of derivatives of gap and slip from the rows of their forces.
 
-    Attributes:
-        columns: Of each row that is not the derivative, shape (n_dofs, m); dof dim · node + component of all
-            nodes.
-        corrected: Number of that row among those of contact, shape (m,).
-        owner: Node whose rank owns both, shape (m,).
+    `columns`: of each row that is not the derivative; dof dim · node + component of all nodes; `corrected`:
+    number of that row among those of contact.
     """
 
     columns: sp.csr_matrix
@@ -82,15 +76,10 @@ class RowCorrections:
 class TurningForces:
     """How forces change as surfaces turn under them, at fixed multipliers, and gaps other than by their rows.
 
-    Attributes:
-        normal: Of the normal forces of contact, symmetric; None where contact points do not move.
-        normal_owner: Node whose rank owns the row of each of its columns.
-        forces: Directions of changes of friction forces and pressures, columns of length one, shape (n_dofs,
-            k).
-        displacements: The displacements that change them, columns of length one, shape (n_dofs, k).
-        stiffness: Change of force for a displacement of one, shape (k,), [force / length].
-        owner: Node whose rank owns the rows of each of these, shape (k,).
-        corrections: Those of rows of contact; None where contact points do not move.
+    `normal`: of the normal forces of contact, symmetric; None where contact points do not move; `forces`:
+    directions of changes of friction forces and pressures, columns of length one; `displacements`: the
+    displacements that change them, columns of length one; `stiffness`: change of force for a displacement of
+    one; `owner`: node whose rank owns the rows of each of these.
     """
 
     normal: GeometricStiffness | None
@@ -123,11 +112,7 @@ class TurningForces:
         return cls(normal, normal_owner, forces, displacements, stiffness, owner[kept], corrections)
 
     def with_springs(self, columns: sp.csr_matrix, stiffness: np.ndarray, owner: np.ndarray) -> TurningForces:
-        """Return those with springs, whose rows come after those of normal forces.
-
-        `columns`: of length one, shape (n_dofs, m); `stiffness`: shape (m,), [force / length]; `owner`: node
-        whose rank owns each row, shape (m,).
-        """
+        """Return those with springs, whose rows come after those of normal forces."""
         if not len(owner):
             return self
         assert self.normal is not None
@@ -207,16 +192,13 @@ def unsymmetric_at(
 class FurtherRows:
     """The rows of turning forces, after all others; positions are among all owned rows.
 
-    Attributes:
-        compliance: Of rows of normal forces, of either sign, zero of others, owned, shape (count,).
-        force_rows: Positions of rows whose multipliers act without being measured: each is what the row of
-            `displacement_rows` of the same number measures, an unsymmetric stiffness; shape (k,).
-        displacement_rows: Positions of these rows, which have no multipliers, shape (k,).
-        share: What each of them measures for a multiplier of one, shape (k,).
-        correction_rows: Positions of rows without multipliers that others need where displacements are
-            measured: the derivative of a gap need not be the row of its force; shape (m,).
-        corrected_rows: Positions of these others, shape (m,).
-        correction: The factor with which the former are added to the latter, shape (m,).
+    `compliance`: of rows of normal forces, of either sign, zero of others, owned; `force_rows`: positions of
+    rows whose multipliers act without being measured: each is what the row of `displacement_rows` of the same
+    number measures, an unsymmetric stiffness; `displacement_rows`: positions of these rows, which have no
+    multipliers; `share`: what each of them measures for a multiplier of one; `correction_rows`: positions of
+    rows without multipliers that others need where displacements are measured: the derivative of a gap need
+    not be the row of its force; `corrected_rows`: positions of these others; `correction`: the factor with
+    which the former are added to the latter.
     """
 
     compliance: Vector
@@ -267,11 +249,8 @@ class FurtherRows:
 class TurningRows(RowGroup):
     """Rows of turning forces on the free components of nodes.
 
-    Attributes:
-        fields: Displacements of nodes that the rows measure, shape (n_dofs, n_rows); dof dim · node +
-            component of all nodes.
-        owner: Node whose rank owns each row, shape (n_rows,).
-        axes: Axes of nodes along which supports prescribe components; None: the coordinates' everywhere.
+    `fields`: displacements of nodes that the rows measure; dof dim · node + component of all nodes; `axes`:
+    axes of nodes along which supports prescribe components; None: the coordinates' everywhere.
     """
 
     fields: sp.csr_matrix
@@ -333,11 +312,8 @@ FACETS = 2.0
 class ContactConfiguration:
     """The contact points at a displacement.
 
-    Attributes:
-        torn: The system with the rows of these points.
-        points: The points of bodies that have moved; None where those of the undeformed bodies are used.
-        start: The points at the start of the load step, in material coordinates of the master; None likewise.
-        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
+    `points`: the points of bodies that have moved; None where those of the undeformed bodies are used;
+    `start`: the points at the start of the load step, in material coordinates of the master; None likewise.
     """
 
     torn: TornSystem

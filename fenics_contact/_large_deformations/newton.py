@@ -47,8 +47,7 @@ class NotHeldError(ConvergenceError):
 class Effort:
     """What Newton's method has taken.
 
-    Attributes:
-        factorisations: Factored tangents, counting all subdomains as one.
+    `factorisations`: factored tangents, counting all subdomains as one.
     """
 
     history: tuple[SolverStep, ...] = ()
@@ -73,9 +72,7 @@ class Effort:
 class NonlinearEquilibrium:
     """The end of a load step.
 
-    Attributes:
-        evaluation: The equations there; all residuals are below the tolerance.
-        linearisation: The last one, from a little before.
+    `linearisation`: the last one, from a little before.
     """
 
     evaluation: ResidualState
@@ -377,9 +374,8 @@ class _Run:
     def _solved(self, state: _State) -> tuple[TangentStep, Linearisation, bool]:
         """Solve the face at the present point, or contact as a whole. Collective.
 
-        At the start of a history nothing is known of the active set.
-
-        Returns the step, the linearisation that it solves, and whether it is that of contact as a whole.
+        At the start of a history nothing is known of the active set. Returns the step, the linearisation that
+        it solves, and whether it is that of contact as a whole.
         """
         evaluation, method, near = state.evaluation, self.method, state.near
         assert near is not None

@@ -46,14 +46,9 @@ FARTHEST_TURN = 2.0 * np.pi / 3.0
 class TurnedSurface:
     """A surface that moves as a rigid piece, by large angles where its body deforms much.
 
-    Attributes:
-        motion: U, [length], then θ, in radians; free components are those of the last configuration.
-        load: Force and moment at the point, shape (3,) in the plane, (6,) in space.
-        springs: Stiffness of springs along and around the axes, shaped likewise.
-        nodes: Its nodes, of those of all bodies, shape (n,).
-        points: Their undeformed coordinates, shape (n, dim), [length].
-        far: Whether it turns by large angles.
-        whole: Whether its body has no other nodes, as that of a tool.
+    `motion`: U, then θ, in radians; free components are those of the last configuration; `load`: force and
+    moment at the point in the plane in space; `far`: whether it turns by large angles; `whole`: whether its
+    body has no other nodes, as that of a tool.
     """
 
     surface: RigidSurface
@@ -175,7 +170,7 @@ class TurnedSurface:
     def stiffness(self, dyad: np.ndarray) -> np.ndarray:
         """Return −∂(g + Σ F·∂u/∂q)/∂q at fixed forces on the nodes, without springs, (n_free, n_free).
 
-        `dyad`: Σ r Fᵀ of the forces F of bodies on the nodes, shape (dim, dim), [force·length].
+        `dyad`: Σ r Fᵀ of the forces F of bodies on the nodes, [force·length].
         """
         dim, whole = self.surface.dim, np.zeros((len(self.motion),) * 2)
         if self.far:

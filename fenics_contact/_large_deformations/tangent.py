@@ -135,11 +135,8 @@ class TangentOperator(FactoredOperator):
 
     The Schur complement is that of K_ρ − C (CᵀK_ρ⁻¹C)⁻¹Cᵀ, which is K without stress: positive, and without
     forces where the modes move. Their stiffness is left to multipliers, preconditioners must leave it out.
-
-    Attributes:
-        modes: Φ, shape (n, m).
-        stiffness: S with K Φ = Ĉ S, Ĉ the orthonormal columns of C, shape (m, m), symmetric.
-        softened: Number of columns for motions that stress has softened.
+    `modes`: Φ; `stiffness`: S with K Φ = Ĉ S, Ĉ the orthonormal columns of C, symmetric; `softened`: number
+    of columns for motions that stress has softened.
     """
 
     _fixing: np.ndarray
@@ -346,13 +343,9 @@ class TangentSystem(DualSystem):
     """The dual of a torn system linearised at a displacement and multipliers.
 
     Its torn system has the tangents of the subdomains as stiffness, the forces out of balance as load, the
-    rigid motions of the present shape as kernel, and c − B u as right side; displacements and multipliers
-    are increments.
-
-    Attributes:
-        stiffness: S of all modes, shape (n_modes, n_modes), replicated.
-        softened: Number of motions of all subdomains that stress has softened or made unstable, which have
-            columns of their own.
+    rigid motions of the present shape as kernel, and c − B u as right side; displacements and multipliers are
+    increments. `softened`: number of motions of all subdomains that stress has softened or made unstable,
+    which have columns of their own.
     """
 
     whole_faces = False

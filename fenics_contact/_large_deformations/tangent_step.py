@@ -54,15 +54,10 @@ EVERY_MOTION: Resisted = _EveryMotion()
 class TangentProblem:
     """The linearisation of a nonlinear problem at a multiplier λ and a displacement u.
 
-    Attributes:
-        problem: F, d and e of increments, G, the law of friction of λ itself; d = B K_ρ⁻¹ r + (B u − c) and
-            e = Φᵀ r with the forces r = f − f_int(u) − Bᵀλ out of balance.
-        stiffness: S of the rigid motions, shape (m, m), replicated.
-        multiplier: λ, owned.
-        residual: c − B u, owned: the residual r of the natural map, gaps and minus the slip.
-        further: The last rows, for the stiffness of forces that turn.
-        flexibility: A typical entry of F, [length / force].
-        resisted: How all motions follow from those of this problem.
+    `problem`: F, d and e of increments, G, the law of friction of λ itself; d = B K_ρ⁻¹ r + (B u − c) and e =
+    Φᵀ r with the forces r = f − f_int(u) − Bᵀλ out of balance; `further`: the last rows, for the stiffness of
+    forces that turn; `flexibility`: A typical entry of F; `resisted`: how all motions follow from those of
+    this problem.
     """
 
     problem: DualProblem
@@ -105,12 +100,7 @@ class _StiffAlone:
 
     By NᵀSβ = Nᵀ(e − G δλ) with β = Q b + N γ. So b are the motions of a problem with Eᵀ G, Eᵀ S Q and Eᵀ e,
     Eᵀ = Qᵀ(I − S N (NᵀSN)⁻¹Nᵀ). The columns of motions that stress has softened may be more than the rows.
-
-    Attributes:
-        whole: The problem of all motions.
-        kept: Q, orthonormal, shape (m, m - k).
-        alone: N, shape (m, k).
-        flexibility: (NᵀSN)⁻¹, shape (k, k).
+    `kept`: Q, orthonormal; `alone`: N; `flexibility`: (NᵀSN)⁻¹.
     """
 
     whole: TangentProblem
@@ -122,8 +112,7 @@ class _StiffAlone:
     def of(cls, at: TangentProblem, columns: sp.csr_matrix, soft: float = 1e-8) -> _StiffAlone | None:
         """Return those of a face; None where some have no stiffness either, or there are none. Collective.
 
-        `columns`: of rows and multipliers of the face, shape (n_owned, n); `soft`: stiffness that is none,
-        relative to the typical one.
+        `soft`: stiffness that is none, relative to the typical one.
         """
         coarse = at.problem.coarse
         null = coarse.comm.bcast(coarse.restricted(columns).gram.null_space)
@@ -156,10 +145,7 @@ class _StiffAlone:
 class TangentStep:
     """One Newton step.
 
-    Attributes:
-        multiplier: λ + δλ, owned.
-        motions: β, shape (m,), replicated.
-        face: The face on which it was taken.
+    `motions`: β, replicated.
     """
 
     multiplier: Vector
@@ -180,8 +166,7 @@ def tangent_step(
 ) -> TangentStep | None:
     """Solve the face that the natural map selects; None where it does not hold every body. Collective.
 
-    `step`: ρ of the natural map, owned; zero on equality rows; `floor`: A residual that is small enough,
-    [length].
+    `floor`: A residual that is small enough.
     """
     factor = None if tangent.problem.scaling is None else tangent.problem.scaling.factor
     at = tangent.scaled()
@@ -231,9 +216,7 @@ def tangent_adjoint(
     """Solve the transpose of a linearised problem; None where its face does not hold every body. Collective.
 
     It is (Zᵀ F W + κ) z − (G Z)ᵀβ = Zᵀ d under G W z + S β = e, with the bases of `tangent_step` swapped.
-
-    `coupling`: growth of slipping forces with their normal forces, shape (n_owned, n_face); `load`: e, shape
-    (m,), replicated.
+    `coupling`: growth of slipping forces with their normal forces; `load`: e, replicated.
     """
     problem = tangent.problem
     factor = 1.0 if problem.scaling is None else problem.scaling.factor
