@@ -43,10 +43,7 @@ def solve_balanced(
 ) -> Rounds:
     """Tighten the tolerance until the solver's error is a share of the mesh's. Collective.
 
-    `start`: multiplier to start from, owned, or None; `good`: a solution this good is accepted where the
-    solver cannot reach the accuracy of the mesh.
-
-    Returns the rounds; the last one holds the solution.
+    `good`: a solution this good is accepted where the solver cannot reach the accuracy of the mesh.
     """
     rounds = Rounds(system, timer)
     tolerance, earlier = balanced.loosest, start
@@ -68,11 +65,7 @@ def solve_balanced(
 
 
 class Rounds:
-    """The rounds of a balanced solve: the last solution, its errors, and the history of all.
-
-    Attributes:
-        displacement: Torn displacement of the last solution on this rank, [length].
-    """
+    """The rounds of a balanced solve: the last solution, its errors, and the history of all."""
 
     last: DualSolution
     displacement: np.ndarray

@@ -56,16 +56,10 @@ TINY = float(np.finfo(float).tiny)
 class Missed:
     """What one pair of a state misses: facets that lie deeper in the master than their nodes.
 
-    Attributes:
-        number: Of the pair.
-        deepest: The deepest points of these facets.
-        points: What they meet, undeformed where displacements are small.
-        bulge: By how much gaps are smaller than those between nodes, shape (n,), [length].
-        pressed_in: How far they are pressed in compared with nodes around, shape (n,), [length].
-        facets: Corners of the facets, shape (n, corners).
-        near: Distances below which points of different facets are the same, shape (n,), [length].
-        places: Where they are, shape (n, dim), [length].
-        moved: How far surfaces move against each other, [length].
+    `deepest`: the deepest points of these facets; `points`: what they meet, undeformed where displacements
+    are small; `bulge`: by how much gaps are smaller than those between nodes; `pressed_in`: how far they are
+    pressed in compared with nodes around; `near`: distances below which points of different facets are the
+    same.
     """
 
     number: int
@@ -89,8 +83,6 @@ def between_nodes(state: State, number: int, moved: float = 0.0) -> Missed | Non
     """Return what a pair misses between its nodes by more than a share of what moves. Collective.
 
     None where it misses nothing, and where its gaps are given. It is looked for once in a state.
-
-    `moved`: how far its surfaces move against each other, at least, [length].
     """
     if number not in state.missed:
         state.missed[number] = _missed(state, number)
@@ -239,7 +231,7 @@ class InsideFacets:
     def after(self, state: State, needed_nodes: np.ndarray) -> InFacets | None:
         """Return other places than those of a state, None where it misses nothing more. Collective.
 
-        `needed_nodes`: points inside facets whose nodes now lie in the master, shape (k,).
+        `needed_nodes`: points inside facets whose nodes now lie in the master.
         """
         points, known = state.contact.points, InFacets.of(state.contact.points)
         needed = np.isin(known.point, needed_nodes)

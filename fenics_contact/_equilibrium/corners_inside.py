@@ -26,12 +26,8 @@ WIDTHS = 0.5
 class _Corners:
     """Corners of a master that face its slave.
 
-    Attributes:
-        sides: The surfaces, where they are if bodies deform much.
-        master: That of the master.
-        nodes: Nodes of slave and of master among those of all bodies.
-        node: Position of each corner in the master, shape (n,).
-        hit: Where they lie over the slave.
+    `sides`: the surfaces, where they are if bodies deform much; `node`: position of each corner in the
+    master; `hit`: where they lie over the slave.
     """
 
     sides: InsideOf

@@ -77,10 +77,7 @@ class DeformedEquilibria:
         self._places = InFacets.none(scene.dim)
 
     def solve(self, scene: Scene, previous: Previous, wanted: Wanted, most: int = 4) -> DeformedState:
-        """Compute the equilibrium of a scene. Collective.
-
-        `most`: how often other points are looked for, inside facets that are pierced between their nodes.
-        """
+        """Compute the equilibrium of a scene. Collective."""
         places, in_later_step = _places_of(previous.before, scene.dim), previous.before is not None
         inside, state = InsideFacets(scene.dim, on_the_way=in_later_step), None
         overlap = wanted.design or previous.is_coarser
@@ -424,8 +421,6 @@ def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
     """Return the stored energy, the work of dead loads and of friction in the last load step. Collective.
 
     The work of pressures that follow their surfaces depends on the way: then it is not known.
-
-    `rubbed`: work of friction before the last step of histories, [force · length].
     """
     stored = [np.nan if response.energy is None else response.energy for response in evaluation.responses]
     strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
@@ -445,13 +440,11 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     Torn displacements, multipliers and histories come back bit for bit; normals and slip are found again, to
     their last places. Fields on whole bodies may differ by a part of the openings at interfaces, which are
     below the tolerance: they are spread inside subdomains by tangents at the equilibrium, before by those of
-    the last Newton step.
-
-    Returns ``displacement`` of all copies of the nodes, shape (n_copies, dim), ``multiplier`` λ of all rows,
-    the ``history`` of materials of each body, with the time and the largest displacement, before the step of
-    histories, the work of friction before it (``rubbed``), and the ``parts`` and ``snaps``; of moved bodies
-    the facets that nodes touch, where, and the slip; else ``origin`` and ``slid``, from which slip is
-    measured. All replicated.
+    the last Newton step. Returns ``displacement`` of all copies of the nodes, shape (n_copies, dim),
+    ``multiplier`` λ of all rows, the ``history`` of materials of each body, with the time and the largest
+    displacement, before the step of histories, the work of friction before it (``rubbed``), and the ``parts``
+    and ``snaps``; of moved bodies the facets that nodes touch, where, and the slip; else ``origin`` and
+    ``slid``, from which slip is measured. All replicated.
     """
     decomposition, evaluation = state.torn.decomposition, state.equilibrium.evaluation
     comm, tearing, at = decomposition.comm, decomposition.tearing, evaluation.at

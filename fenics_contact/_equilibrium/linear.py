@@ -88,12 +88,7 @@ class LinearEquilibria:
         self._balances = balances
 
     def solve(self, scene: Scene, previous: Previous, wanted: Wanted) -> LinearState:
-        """Compute the equilibrium of a scene. Collective.
-
-        Raises:
-            InfeasibleError: If nothing holds some body.
-            ConvergenceError: If the solver does not reach its tolerance.
-        """
+        """Compute the equilibrium of a scene. Collective."""
         with self._timer.phase("assemble"):
             torn = _torn(scene, self._decomposition, previous, wanted)
             torn = _checked(previous.with_slip(torn), previous.known)
@@ -105,10 +100,7 @@ class LinearEquilibria:
     def _with_points_inside(
         self, state: LinearState, previous: Previous, wanted: Wanted, most: int = 4
     ) -> LinearState:
-        """Return the state in which facets press that lie between nodes in a master. Collective.
-
-        `most`: how often other points are looked for; what a state still misses is a warning.
-        """
+        """Return the state in which facets press that lie between nodes in a master. Collective."""
 
         def solved(torn: TornSystem, last: LinearState | None) -> LinearState:
             return self._solved(torn, replace(previous, start=last, known=None), wanted)

@@ -24,12 +24,8 @@ def prescribed_as_is(torn: TornSystem, displacement: np.ndarray, after: Decompos
     """Return what supports would prescribe that hold nodes where those of a state have them. Collective.
 
     What both hold keeps its numbers, so that what rests does so exactly; what is held newly has the
-    displacement of the state.
-
-    `torn`: the system of the state; `displacement`: torn, of this rank, [length]; `after`: the subdomains
-    with the supports that hold.
-
-    Returns shape (n_nodes, dim), NaN where free, along the axes of nodes, [length].
+    displacement of the state. Returns shape (n_nodes, dim), NaN where free, along the axes of nodes,
+    [length].
     """
     known, axes = prescribed_along(torn.scene, torn.decomposition.tearing)
     there, nodes = np.zeros_like(known), np.flatnonzero(after.fixed.any(axis=1))
@@ -126,10 +122,7 @@ def has_rows_of(state: State, after: TornSystem) -> bool:
 
 
 def on_rows_of(state: State, after: TornSystem) -> tuple[TornSystem, np.ndarray]:
-    """Return the system of a state on other rows, where its supports are, and its multipliers. Collective.
-
-    `after`: the system of a scene with the meshes of the state.
-    """
+    """Return the system of a state on other rows, where its supports are, and its multipliers. Collective."""
     decomposition, displacement = after.decomposition, state.torn_displacement
     scene = replace(state.scene, supports=after.scene.supports, contacts=after.scene.contacts)
     torn = with_points_inside(build_torn_system(scene, decomposition, overlap=True, previous=after), after)

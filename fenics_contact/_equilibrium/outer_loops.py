@@ -58,11 +58,7 @@ def nested(
     before: State | None,
     tolerance: float,
 ) -> Solve:
-    """Return the solution of a system inside all loops.
-
-    `known`: state from which the first passes start; `before`: at the end of the load step before;
-    `tolerance`: largest relative change in the last passes.
-    """
+    """Return the solution of a system inside all loops."""
 
     def around(inner: Solve, loop: OuterLoop) -> Solve:
         def solved(torn: TornSystem, last: LinearState | None) -> LinearState:

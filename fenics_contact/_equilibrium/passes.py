@@ -18,9 +18,7 @@ Solve = Callable[[TornSystem, LinearState | None], LinearState]
 class Passes:
     """Passes so far, each of which starts from the last.
 
-    Attributes:
-        count: How many there were.
-        history: The solver's steps in all of them, with the products up to each.
+    `count`: how many there were.
     """
 
     def __init__(self, solve: Solve, known: State | None) -> None:
@@ -31,11 +29,7 @@ class Passes:
         self.history: list[SolverStep] = []
 
     def run(self, torn: TornSystem) -> LinearState:
-        """Return the state of a system. Collective.
-
-        Raises:
-            ConvergenceError: As its solve; carries the history of all passes.
-        """
+        """Return the state of a system. Collective."""
         try:
             self._state = state = self._solve(torn, self._state)
         except ConvergenceError as failure:

@@ -21,12 +21,10 @@ def coarse_peak(
 
     So it is of round bodies, and of flat ones that bend away from each other. Contact that ends where a
     surface ends has no peak that more points would resolve. Where facets of the master are wider than the
-    slave's, the pressure follows them, and they count.
-
-    `pressed_in`: how far its force presses each contact point in, shape (n,), [length]; `curved`: gaps of the
-    deformed bodies that grow by this share of how far the point of the largest pressure is pressed in show
-    that contact ends there; `most`: cells from the largest pressure to the edge that leave it uncertain;
-    `few`: so many points that press resolve no pressure, wherever the others are.
+    slave's, the pressure follows them, and they count. `curved`: gaps of the deformed bodies that grow by
+    this share of how far the point of the largest pressure is pressed in show that contact ends there;
+    `most`: cells from the largest pressure to the edge that leave it uncertain; `few`: so many points that
+    press resolve no pressure, wherever the others are.
     """
     contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
     mine = contact.on_pair(number)

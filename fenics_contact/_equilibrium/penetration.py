@@ -26,11 +26,8 @@ _LOG = logging.getLogger(__name__)
 class Front:
     """The contact points that fluid may reach, and from where; replicated.
 
-    Attributes:
-        neighbours: Points that share a facet of the slave, shape (n, n).
-        inlet: Points where fluid enters, shape (n,).
-        pressure: Of the fluid at each point, zero where there is none, shape (n,), [force / length²].
-        critical: Contact pressures up to which points count as open, shape (n,).
+    `neighbours`: points that share a facet of the slave; `inlet`: points where fluid enters; `critical`:
+    contact pressures up to which points count as open.
     """
 
     neighbours: sp.csr_matrix
@@ -105,9 +102,6 @@ class FluidFront:
 
         Every pass is one solution; fluid that opens the next points moves on. Where the front comes back to
         an earlier place, pressures and friction let it move forth and back, and there is no such state.
-
-        Raises:
-            ConvergenceError: If the front does not come to rest; carries the history of all passes.
         """
         front = Front.of(torn)
         wet = np.zeros(torn.points.count, dtype=bool)

@@ -32,10 +32,8 @@ if TYPE_CHECKING:
 class Wanted:
     """What is wanted of a solution.
 
-    Attributes:
-        tolerance: Its accuracy.
-        step: The load step; None outside of load steps.
-        design: Whether it is the state of a design, of which derivatives are wanted.
+    `tolerance`: its accuracy; `step`: the load step; None outside of load steps; `design`: whether it is the
+    state of a design, of which derivatives are wanted.
     """
 
     tolerance: Tolerance
@@ -62,11 +60,9 @@ class Equilibria(Protocol):
 class Previous:
     """Earlier states.
 
-    Attributes:
-        before: At the end of the load step before, also on other meshes: slip is measured from there, and
-            histories go on; None: the undeformed bodies.
-        start: Whose multipliers come first, also on coarser meshes; None: zero.
-        known: Of which parts may be reused; None: nothing.
+    `before`: at the end of the load step before, also on other meshes: slip is measured from there, and
+    histories go on; None: the undeformed bodies; `start`: whose multipliers come first, also on coarser
+    meshes; None: zero; `known`: of which parts may be reused; None: nothing.
     """
 
     before: State | CarriedState | None = None

@@ -61,9 +61,6 @@ class FrictionBySlip:
 
         The tolerance is the largest change of a slip bound relative to the largest.
 
-        Raises:
-            ConvergenceError: If they do not agree; carries the history of all passes.
-
         References:
             U. Küttler, W. A. Wall, Fixed-point fluid–structure interaction solvers with dynamic relaxation,
             Comput. Mech. 43 (2008) 61–72.

@@ -148,10 +148,7 @@ def _renumbered(before: TornSystem, after: TornSystem) -> ContactPoints:
 
 
 def put_contact(torn: TornSystem, vector: np.ndarray, normal: np.ndarray, friction: np.ndarray) -> None:
-    """Write contact forces into an owned vector.
-
-    `normal`: λ_N of every contact point, shape (n,); `friction`: τ as vectors in space, shape (n, dim).
-    """
+    """Write contact forces into an owned vector."""
     _put(torn, vector, torn.normal_rows, normal)
     if len(torn.frictional):
         turned = np.einsum("nad,nd->na", torn.points.tangents[torn.frictional], friction[torn.frictional])
@@ -178,11 +175,8 @@ class CoarseStart:
 
     with the loads f̂ condensed on the interface and the Schur complements S. If u is the solution, so is λ_E;
     else the error of λ is of the size of that of u, both in energy, whatever the number of subdomains.
-
-    Attributes:
-        state: The state on the coarse meshes.
-        refinements: Body name -> refinement of its mesh, or how it became another one of the same family;
-            bodies that are not named have kept theirs.
+    `refinements`: body name -> refinement of its mesh, or how it became another one of the same family;
+    bodies that are not named have kept theirs.
 
     References:
         R. E. Bank, T. Dupont: An optimal order process for solving finite element equations. Mathematics of

@@ -121,10 +121,7 @@ def _of_joints(torn: TornSystem, bodies: list[RigidBody]) -> sp.csr_matrix:
 
 
 def rigid_bodies(torn: TornSystem, *, sprung: bool = True) -> list[RigidBody]:
-    """Return the bodies regarded as rigid; sections of preloads separate some into parts.
-
-    `sprung`: whether elastic foundations count.
-    """
+    """Return the bodies regarded as rigid; sections of preloads separate some into parts."""
     found = []
     for index, body in enumerate(torn.scene.bodies.values()):
         if not body.mesh.cuts:
@@ -139,7 +136,7 @@ def rigid_bodies(torn: TornSystem, *, sprung: bool = True) -> list[RigidBody]:
 class RigidBody:
     """A body regarded as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it.
 
-    `part`: marks of the nodes of a part of it, shape (n_nodes,); all by default.
+    `part`: marks of the nodes of a part of it; all by default.
     """
 
     def __init__(
@@ -248,12 +245,8 @@ class _Left:
 class _Balance:
     """Forces that are to balance a load on rigid bodies.
 
-    Attributes:
-        torn: The torn system with its friction coefficients.
-        support: Wrenches that act in both directions, shape (n_wrenches, n).
-        contact: Wrenches of unit contact forces, shape (n_wrenches, n_contact + (dim - 1) n_friction).
-        right: The wrench to balance, shape (n_wrenches,).
-        tresca_bound: Tresca bounds in the unit of force of ``right``, shape (n_friction,).
+    `support`: wrenches that act in both directions; `contact`: wrenches of unit contact forces; `right`: the
+    wrench to balance.
     """
 
     torn: TornSystem
@@ -266,13 +259,10 @@ class _Balance:
         """Minimise ‖[support contact] x − right‖ + Σ μ s λ_N over x = (reactions, λ_N, τ) in its cones.
 
         The smallest distance, unlike feasibility, is well determined also where forces only just suffice.
-
-        `speed`: sliding speeds s for the associated law to be freed of lift-off, shape (n_friction,);
-        `small`: weight of the normal forces relative to the unbalanced load: it bounds the forces of bodies
-        that grip each other, and leaves nothing unbalanced where forces below its inverse times the load
-        suffice.
-
-        Returns None if the load is balanced, else the direction of what is left.
+        Returns None if the load is balanced, else the direction of what is left. `speed`: sliding speeds s
+        for the associated law to be freed of lift-off; `small`: weight of the normal forces relative to the
+        unbalanced load: it bounds the forces of bodies that grip each other, and leaves nothing unbalanced
+        where forces below its inverse times the load suffice.
         """
         import clarabel  # only needed if some loaded body floats
 
@@ -320,8 +310,8 @@ class _Balance:
         The direction v of what is left obeys the associated law, v_N ≥ μ (|v_T| − s), by which what slides
         lifts off where s = 0. Where s = |v_T|, v_N ≥ 0 ⊥ λ_N and what slides stays on: a fixed point in v.
 
-        Reference: V. Acary, F. Cadoux, G. Goeleven, J. Malick, *A formulation of the linear discrete
-        Coulomb friction problem via convex optimization*, ZAMM 91 (2011) 155–175.
+        Reference: V. Acary, F. Cadoux, G. Goeleven, J. Malick, *A formulation of the linear discrete Coulomb
+        friction problem via convex optimization*, ZAMM 91 (2011) 155–175.
         """
         torn, before = self.torn, None
         slip = self.contact[:, torn.points.count :]
@@ -337,10 +327,8 @@ class _Balance:
 class _Motion:
     """How bodies set off.
 
-    Attributes:
-        bodies: Coefficients of the modes of each body, shape (n_bodies, n_modes).
-        pressed: Normal forces meanwhile, relative to the load, shape (n_contact,).
-        slides: Whether more friction would: something slides that is pressed.
+    `pressed`: normal forces meanwhile, relative to the load; `slides`: whether more friction would: something
+    slides that is pressed.
     """
 
     bodies: np.ndarray
@@ -443,8 +431,6 @@ CHUNK = 4096
 def unresisted_motions(torn: TornSystem, *, sprung: bool = True) -> tuple[UnheldMotion, ...]:
     """Return the rigid motions that no support, tie, contact or material resists at rest. Collective.
 
-    `sprung`: whether elastic foundations count, too.
-
     Contact counts wherever its surfaces face each other, also across a gap, and in both directions. Surfaces
     with friction and obstacles that move may meet anywhere later: they count against all motions.
     """
@@ -455,8 +441,6 @@ def require_resisted(motions: tuple[UnheldMotion, ...], torn: TornSystem, prescr
     """Reject scenes in which a body that nothing resists is loaded or moved. Collective.
 
     Stress would drive it, if only by rounding. Bodies at which nothing happens may stay until they are met.
-
-    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
     """
     if not motions:
         return

@@ -65,11 +65,7 @@ class Kind(Enum):
 class Doubt:
     """A doubt about a pair.
 
-    Attributes:
-        pair: Its number.
-        kind: What is doubtful.
-        words: The warning.
-        is_small: Whether most of the contact is resolved all the same: that is information, no warning.
+    `is_small`: whether most of the contact is resolved all the same: that is information, no warning.
     """
 
     pair: int
@@ -267,11 +263,7 @@ class ContactWarnings:
 class _Gradients:
     """How gradients of cells follow from the displacements of their corners, by least squares.
 
-    Attributes:
-        corners: Corners of the cells, shape (n, k).
-        inverse: Gradient by the displacement of each corner, shape (n, k, dim), [1 / length].
-        size: Volumes up to a factor, shape (n,).
-        radius: First coordinate of the middles, shape (n,), [length].
+    `inverse`: gradient by the displacement of each corner, [1 / length]; `size`: volumes up to a factor.
     """
 
     corners: np.ndarray
@@ -293,10 +285,7 @@ class _Gradients:
         return float(np.linalg.norm(self.inverse, axis=2).sum(axis=1).max())
 
     def rotation(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the sum of the squares of the rotations of cells, weighted by size, and that of sizes.
-
-        `displacement`: of the nodes, shape (n_nodes, dim), [length].
-        """
+        """Return the sum of the squares of the rotations of cells, weighted by size, and that of sizes."""
         gradient = self._gradient(displacement)
         square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
         return np.array([square @ self.size, self.size.sum()])
@@ -330,10 +319,7 @@ def _moved_cells(state: State, name: str, mesh: BodyMesh) -> Iterator[tuple[_Gra
 
 
 def rotation_of(comm: MPI.Comm, parts: Iterable[tuple[_Gradients, np.ndarray]]) -> float:
-    """Return by how much the cells of a body turn, as a root mean square, in radians. Collective.
-
-    `parts`: gradients of cells of this rank and displacements of their nodes, shape (n_nodes, dim), [length].
-    """
+    """Return by how much the cells of a body turn, as a root mean square, in radians. Collective."""
     sums = comm.allreduce(sum((gradients.rotation(moved) for gradients, moved in parts), np.zeros(2)))
     return float(np.sqrt(sums[0] / sums[1]))
 
@@ -453,10 +439,7 @@ def _finer_gap(torn: TornSystem) -> np.ndarray:
 
 
 def _passing_nodes(state: State, number: int, moved: float) -> list[Doubt]:
-    """Return the doubt about a pair whose master passes between the nodes of its slave. Collective.
-
-    `moved`: how far its surfaces move against each other, [length].
-    """
+    """Return the doubt about a pair whose master passes between the nodes of its slave. Collective."""
     pair = state.scene.contacts[number]
     if pair.by_mortar or not isinstance(pair.master, Surface) or pair.within_body or pair.nodes is not None:
         return []
@@ -477,10 +460,7 @@ def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> l
     """Return the doubt about a pair by mortar that nothing closes although nodes lie inside the master.
 
     A round body on coarse facets is so, as means over its facets are open where its lowest node is not.
-    Collective.
-
-    `moved`: how far its surfaces move against each other, [length]; `most`: depth of nodes, relative to it,
-    that is no doubt yet.
+    Collective. `most`: depth of nodes, relative to it, that is no doubt yet.
     """
     contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
     presses = contact.normal_force[contact.on_pair(number)].any()
