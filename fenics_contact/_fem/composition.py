@@ -23,8 +23,7 @@ OfMaterial = Callable[[Material, Constants], Expr | None]
 class Composition:
     """The materials of the cells of one mesh.
 
-    Attributes:
-        cells: Tag (from 1, in the order of the materials) -> cells of the mesh; None if there is only one.
+    `cells`: tag (from 1, in the order of the materials) -> cells of the mesh; None if there is only one.
     """
 
     materials: tuple[Material, ...]

@@ -35,12 +35,8 @@ from fenics_contact.materials.plastic import HistoryMaterial
 class Fields(NamedTuple):
     """The displacement, and the dilatation and pressure of cells, on the template.
 
-    Attributes:
-        u: The displacement, as materials get it.
-        v: Its test function.
-        du: Its trial function.
-        tests: Such polynomials as test and as trial function.
-        swelling: Cube of the thermal stretch: what is held beside the dilatation is so in its total.
+    `tests`: such polynomials as test and as trial function; `swelling`: cube of the thermal stretch: what is
+    held beside the dilatation is so in its total.
     """
 
     u: Expr

@@ -111,9 +111,7 @@ class FormLibrary:
     ) -> _dolfinx.fem.Form:
         """Return the linear form of ``load`` bound to ``space``.
 
-        `points`: coordinates by input node of the mesh, shape (n, dim), [length]; `facets`: (cells, local
-        facets) on which a surface load acts; `acted`: marks of the nodes of its surface by input node, shape
-        (n,); `cells`: from `loaded_cells`; `of_cells`: an initial stress on the cells, (n_cells, 6).
+        `acted`: marks of the nodes of its surface by input node; `of_cells`: an initial stress on the cells.
         """
         template = self._templates[load_key(load, parts.materials, element)]
         functions = load_fields(load, space, points, acted, of_cells)
@@ -138,10 +136,7 @@ class FormLibrary:
     def mechanics(
         self, parts: Composition, element: Element, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
     ) -> Mechanics:
-        """Return forces and tangent of the materials ``parts`` on one mesh of a scene with nonlinear ones.
-
-        `points`: coordinates by input node, shape (n, dim), [length].
-        """
+        """Return forces and tangent of the materials ``parts`` on one mesh of a scene with nonlinear ones."""
         from fenics_contact._fem.mechanics import HyperelasticMechanics, LinearMechanics
 
         if not any(self.varies(material, element) for material in parts.materials):
@@ -253,12 +248,7 @@ def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
 
 @dataclass(frozen=True)
 class Temperature:
-    """The sum of the temperature changes of one body, and of its initial stresses.
-
-    Attributes:
-        loads: The temperature changes; without any, no form depends on temperature.
-        initial: The initial stresses; without any, no form depends on them.
-    """
+    """The sum of the temperature changes of one body, and of its initial stresses."""
 
     loads: tuple[ThermalStrain, ...] = ()
     initial: tuple[InitialStress, ...] = ()
@@ -290,11 +280,7 @@ class Temperature:
     def fields(
         self, mesh: _dolfinx.mesh.Mesh, points: np.ndarray, stress: np.ndarray | None = None
     ) -> tuple[_dolfinx.fem.Function, ...]:
-        """Return the Functions for the coefficients.
-
-        `points`: coordinates by input node, shape (n, dim), [length]; `stress`: the initial stress on this
-        rank's cells, where there is one, (n_owned, 6).
-        """
+        """Return the Functions for the coefficients."""
         if self.initial:
             assert stress is not None
             field = _dolfinx.cell_field(mesh, "initial_stress", stress)
@@ -335,10 +321,7 @@ def temperature_of(loads: Iterable[Load], body: str) -> Temperature:
 class AtRest:
     """What stresses a body that does not move.
 
-    Attributes:
-        temperature: ΔT (UFL), None without one.
-        stress: Initial stress, 3 x 3 (UFL), None without one.
-        element: That of the body.
+    `temperature`: ΔT (UFL), None without one; `stress`: initial stress, 3 x 3 (UFL), None without one.
     """
 
     temperature: Expr | None

@@ -28,10 +28,7 @@ class Dilatation:
     """det F at the Gauss points of one mesh."""
 
     def __init__(self, space: _dolfinx.fem.FunctionSpace, element: Element, points: np.ndarray) -> None:
-        """Evaluate the Jacobians of the undeformed cells.
-
-        `points`: coordinates by block, shape (n, dim), [length].
-        """
+        """Evaluate the Jacobians of the undeformed cells."""
         self._positions, _ = quadrature(element.cell, quadrature_degree(element))
         self._points, self._cells = points, _dolfinx.vtk_cell_dofs(space)
         self._element = element
@@ -43,10 +40,7 @@ class Dilatation:
         return CellPolynomials(self._points, self._cells, self._element)
 
     def least(self, displacement: np.ndarray) -> float:
-        """Return the smallest det F of all Gauss points.
-
-        `displacement`: by dof, shape (dim n,), [length].
-        """
+        """Return the smallest det F of all Gauss points."""
         return float(self.at(displacement).min())
 
     def at(self, displacement: np.ndarray) -> np.ndarray:
@@ -64,10 +58,7 @@ HELD = 0.02
 
 
 def held_share(moduli: np.ndarray) -> float:
-    """Return the share of a dilatation's variation in a cell that is not projected away, see `HELD`.
-
-    `moduli`: of the material at rest, by Voigt components, shape (6, 6), [force / length²].
-    """
+    """Return the share of a dilatation's variation in a cell that is not projected away, see `HELD`."""
     bulk, shear = moduli[:3, :3].sum() / 9.0, np.trace(moduli[3:, 3:]) / 3.0
     return float(np.sqrt(min(1.0, HELD * shear / bulk)))
 
@@ -90,10 +81,7 @@ class MeanStrain:
         self._gradients, self._polynomials, self._part = gradients, polynomials, 1.0 - share
 
     def averaged(self, tensors: np.ndarray) -> np.ndarray:
-        """Return H̄ of H; of the stress on H̄ that which does the same work on H.
-
-        `tensors`: H, or the stress, shape (n_cells, n_gauss, 3, 3).
-        """
+        """Return H̄ of H; of the stress on H̄ that which does the same work on H."""
         apart = self._apart(np.einsum("cqii->cq", tensors)[..., None])
         return np.asarray(tensors + apart[..., None] * np.eye(3))
 
@@ -102,10 +90,7 @@ class MeanStrain:
         return self._part / 3.0 * (self._polynomials.projected(traces) - traces)
 
     def blocks(self, tangent: np.ndarray) -> np.ndarray:
-        """Return what ∫ ∇v̄ : A : ∇ū has beside ∫ ∇v : A : ∇u, shape (n_cells, dim nodes, dim nodes).
-
-        `tangent`: A, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
-        """
+        """Return what ∫ ∇v̄ : A : ∇ū has beside ∫ ∇v : A : ∇u, shape (n_cells, dim nodes, dim nodes)."""
         divergence = self._gradients.divergence
         flat = (*divergence.shape[:2], -1)
         apart = self._apart(divergence.reshape(flat))
@@ -123,10 +108,7 @@ class GaussPoints:
     """The Gauss points of one mesh: those of the package's forms on cells of this type."""
 
     def __init__(self, space: _dolfinx.fem.FunctionSpace, element: Element, points: np.ndarray) -> None:
-        """Evaluate the gradients of the shape functions.
-
-        `points`: coordinates by block, shape (n, dim), [length].
-        """
+        """Evaluate the gradients of the shape functions."""
         cell = element.cell
         positions, weights = quadrature(cell, quadrature_degree(element))
         reference = shape_gradients(cell, positions)
@@ -144,10 +126,7 @@ class GaussPoints:
         return self._weights.shape[0], self._weights.shape[1]
 
     def gradient(self, displacement: np.ndarray) -> np.ndarray:
-        """Return ∂u_i/∂X_j in three dimensions, zero out of the plane, shape (n_cells, n_gauss, 3, 3).
-
-        `displacement`: by dof, shape (dim n,), [length].
-        """
+        """Return ∂u_i/∂X_j in three dimensions, zero out of the plane, shape (n_cells, n_gauss, 3, 3)."""
         return self._gradients.of(displacement.reshape(self._shape)[self._cells])
 
     def interpolated(self, nodal: np.ndarray) -> np.ndarray:
@@ -155,28 +134,19 @@ class GaussPoints:
         return np.asarray(nodal[self._cells] @ self._values.T)
 
     def force(self, stress: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Return ∫ P : ∇v over some cells by dof, shape (dim n,), [force].
-
-        `stress`: P at their points, shape (n_cells, n_gauss, 3, 3), [force / length²].
-        """
+        """Return ∫ P : ∇v over some cells by dof, shape (dim n,), [force]."""
         nodal = self._gradients.part(cells).force(self._weights[cells], stress)
         return np.bincount(self._dofs[cells].ravel(), nodal.ravel(), minlength=int(np.prod(self._shape)))
 
     def mean_strain(self, cells: np.ndarray, moduli: np.ndarray) -> MeanStrain:
-        """Return the means of changes of volume in some cells.
-
-        `moduli`: of the material at rest, by Voigt components, shape (6, 6), [force / length²].
-        """
+        """Return the means of changes of volume in some cells."""
         share = held_share(moduli) if self._element.cells in UNSEEN else 0.0
         return MeanStrain(self._gradients.part(cells), self._polynomials.of(cells), share)
 
     def stiffness(
         self, tangent: np.ndarray, cells: np.ndarray, means: MeanStrain | None = None
     ) -> np.ndarray:
-        """Return ∫ ∇v : A : ∇u over some cells: entries of the matrix of `assembled`.
-
-        `tangent`: A at their points, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
-        """
+        """Return ∫ ∇v : A : ∇u over some cells: entries of the matrix of `assembled`."""
         entries = self._gradients.part(cells).blocks(self._weights[cells], tangent).ravel()
         if means is not None:
             entries = entries + means.blocks(tangent).ravel()
@@ -236,9 +206,8 @@ class MeanDilatation:
     """The dilatations θ in the cells of one mesh, which are polynomials, and their part of the tangent.
 
     With the polynomials ψ_i of a cell and M_ij = ∫ ψ_i ψ_j, the coefficients of θ = Π J and p = Π U'(θ) are
-    M⁻¹ ∫ ψ J and M⁻¹ ∫ ψ U'(θ). With (D v)_i = ∫ ψ_i cof F : ∇v the tangent at fixed θ and p lacks
-    (M⁻¹ D u) · H (M⁻¹ D v), H_ij = ∫ U''(θ) ψ_i ψ_j, summed over the cells. A constant θ is the mean of
-    a cell.
+    M⁻¹ ∫ ψ J and M⁻¹ ∫ ψ U'(θ). With (D v)_i = ∫ ψ_i cof F : ∇v the tangent at fixed θ and p lacks (M⁻¹ D u)
+    · H (M⁻¹ D v), H_ij = ∫ U''(θ) ψ_i ψ_j, summed over the cells. A constant θ is the mean of a cell.
 
     References:
         J. C. Simo, R. L. Taylor, K. S. Pister, Variational and projection methods for the volume constraint
@@ -278,9 +247,8 @@ class MeanDilatation:
     def foresee(self, origin: np.ndarray, displacement: np.ndarray, flattened: float = 0.1) -> None:
         """Set the dilatations to those that a step was expected to lead to, θ + M⁻¹ D δu, and the pressures.
 
-        Where that turns a cell inside out, or nearly so, to those that it led to.
-
-        `flattened`: part of the dilatation that a step led to, below which a foreseen one says nothing.
+        Where that turns a cell inside out, or nearly so, to those that it led to. `flattened`: part of the
+        dilatation that a step led to, below which a foreseen one says nothing.
         """
         shape = self._polynomials.centres.shape[0], -1
         change = (self._inverse @ (self._volume_changes() @ (displacement - origin))).reshape(shape)

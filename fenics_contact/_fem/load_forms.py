@@ -55,10 +55,7 @@ def region_of(load: Load) -> str | None:
 def loaded_cells(
     load: Load, parts: Composition, body: Body, cells: np.ndarray
 ) -> dict[int, np.ndarray] | None:
-    """Return the cells of one mesh by the tags of a load's form, None if it has none.
-
-    `cells`: the cells of the body that are those of the mesh, (n_cells,).
-    """
+    """Return the cells of one mesh by the tags of a load's form, None if it has none."""
     region = region_of(load)
     if region is not None and not isinstance(load, InitialStress):
         return {LOADED: np.flatnonzero(np.isin(cells, body.mesh.regions[region]))}
@@ -126,9 +123,7 @@ def load_fields(
 ) -> tuple[_dolfinx.fem.Function, ...]:
     """Return the Functions for a symbol's coefficients.
 
-    `points`: coordinates by input node of that mesh, shape (n, dim), [length]; `acted`: marks of the nodes on
-    the load's surface, shape (n,); the value is asked for only there; `of_cells`: values on the cells of that
-    mesh of an initial stress, (n_cells, 6).
+    `acted`: marks of the nodes on the load's surface; the value is asked for only there.
     """
     if isinstance(load, InitialStress):
         assert of_cells is not None

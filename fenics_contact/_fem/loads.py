@@ -95,8 +95,6 @@ class FollowingPressure:
     def at(self, displacement: np.ndarray) -> tuple[np.ndarray, sp.csr_matrix]:
         """Return what the force is more than on the undeformed surface, and its stiffness.
 
-        `displacement`: by dof, shape (dim n,), [length].
-
         Returns force, shape (dim n,), [force]; less its growth with the displacement, shape (dim n, dim n),
         [force / length].
         """
@@ -114,10 +112,7 @@ class FollowingPressure:
 class LinearTraction:
     """A traction a + b × (x − c) that grows linearly with the distance from a point; a function of position.
 
-    Attributes:
-        even: a, shape (dim,), [force / length²].
-        turning: b, shape (3,), in the plane (1,), [force / length³].
-        centre: c, shape (dim,), [length].
+    `even`: a; `turning`: b, in the plane (1,); `centre`: c.
     """
 
     even: GivenVector
@@ -139,9 +134,7 @@ class LinearTraction:
 class TwistingTraction:
     """A traction on a body of revolution that grows around the axis with the radius, a + b r e_θ.
 
-    Attributes:
-        even: a, shape (3,), [force / length²].
-        turning: b, [force / length³].
+    `even`: a; `turning`: b.
     """
 
     even: GivenVector

@@ -35,11 +35,8 @@ class History:
     """Internal variables of the bodies whose materials have some, replicated on all ranks.
 
     They are kept by the cells of the bodies' meshes, so that they do not depend on subdomains and ranks. A
-    body that moves keeps them.
-
-    Attributes:
-        values: Name of a body to its internal variables, shape (n_cells, n_gauss, k); where several
-            materials have different numbers of them, the first ones count.
+    body that moves keeps them. `values`: name of a body to its internal variables; where several materials
+    have different numbers of them, the first ones count.
     """
 
     values: Mapping[str, np.ndarray]
@@ -63,10 +60,7 @@ class History:
         return History(values)
 
     def carried(self, old: Scene, new: Scene, transfers: Mapping[str, MeshTransfer]) -> History:
-        """Return the history on other meshes of the bodies, see `MeshTransfer.at_gauss_points`.
-
-        `transfers`: body name -> how its mesh became another one; others have kept theirs.
-        """
+        """Return the history on other meshes of the bodies, see `MeshTransfer.at_gauss_points`."""
         values = dict(self.values)
         for name, transfer in transfers.items():
             if name not in values:
@@ -99,18 +93,11 @@ class Response:
     """What a mesh with nonlinear materials answers to a displacement.
 
     Where cells are turned inside out, `least_jacobian` says so and the other numbers mean nothing; with most
-    models they are NaN.
-
-    Attributes:
-        force: Internal force f(u), by dof, shape (dim n,), [force].
-        tangent: Assembles `stiffness`.
-        energy: Stored energy, [force · length]; None where materials dissipate.
-        least_jacobian: Smallest det F at a Gauss point; 0 or less is an inverted cell.
-        history: Internal variables at the end of the step, shape (n_cells, n_gauss, k); None without any.
-        stress: Cauchy stress at the Gauss points of materials with a history, [force / length²], shape
-            (n_cells, n_gauss, 3, 3), NaN in cells of other materials; None without any.
-        by_stress: Assembles the part of `stiffness` that is due to stresses as they turn with the cells;
-            None where tangents at rest are a measure of what materials resist.
+    models they are NaN. `energy`: stored energy, [force · length]; None where materials dissipate; `history`:
+    internal variables at the end of the step; None without any; `stress`: cauchy stress at the Gauss points
+    of materials with a history, NaN in cells of other materials; None without any; `by_stress`: assembles the
+    part of `stiffness` that is due to stresses as they turn with the cells; None where tangents at rest are a
+    measure of what materials resist.
     """
 
     force: np.ndarray
@@ -140,13 +127,10 @@ class Response:
 class MaterialStep:
     """What materials remember of a load step's start, and what led to a displacement.
 
-    Attributes:
-        history: Internal variables at the start, for materials that have some, shape (n_cells, n_gauss, k) by
-            the mesh's cells; None for an unloaded body.
-        duration: Time since the start, for materials that creep.
-        origin: Displacement at the start of the Newton step, None where there was none: tangents of mean
-            dilatations have the pressures that this step foresaw.
-        temperature: Change of temperature by input node, shape (n,), None without any.
+    `history`: internal variables at the start, for materials that have some by the mesh's cells; None for an
+    unloaded body; `duration`: time since the start, for materials that creep; `origin`: displacement at the
+    start of the Newton step, None where there was none: tangents of mean dilatations have the pressures that
+    this step foresaw; `temperature`: change of temperature by input node, None without any.
     """
 
     history: np.ndarray | None = None
@@ -179,11 +163,7 @@ class HistoryMechanics:
         points: np.ndarray,
         others: Mechanics | None,
     ) -> None:
-        """Evaluate shape functions.
-
-        `points`: coordinates by input node, shape (n, dim), [length]; `others`: the mechanics of the
-        materials without history, None where there are none.
-        """
+        """Evaluate shape functions."""
         nodes, dofs = self._blocks = _dolfinx.node_dofs(space)
         by_block = np.empty_like(points)
         by_block[dofs] = points[nodes]
@@ -287,8 +267,6 @@ def _without_expansion(
     """Return the displacement gradients that a material feels, and its thermal stretches θ.
 
     Of large deformations P = θ² P(F / θ), as of the energy θ³ W(F / θ); else strains are subtracted, θ = 1.
-
-    `gradient`: shape (n_cells, n_gauss, 3, 3); `heat`: changes of temperature, shape (n_cells, n_gauss).
 
     The stretches have the shape (n_cells, n_gauss, 1, 1), or (1, 1) where all are one.
     """
@@ -401,10 +379,7 @@ class LinearMechanics:
     """`Mechanics` of linear materials alone: small strains, whatever the displacement."""
 
     def __init__(self, stiffness: _dolfinx.fem.Form, mesh: _dolfinx.mesh.Mesh, points: np.ndarray) -> None:
-        """Assemble.
-
-        `points`: coordinates by input node, shape (n, dim), [length].
-        """
+        """Assemble."""
         _dolfinx.update_coordinates(mesh, points)
         indptr, indices, data = _dolfinx.assemble_csr(stiffness)
         self._stiffness = sp.csr_matrix((data, indices, indptr), shape=(points.size,) * 2)

@@ -222,9 +222,6 @@ def check_kernel(
     """Check that a stiffness matrix annihilates its kernel.
 
     All modes are tested at once, each with a weight of its own.
-
-    `stiffness`: K, dense or sparse, shape (n, n); `kernel`: R, shape (n, n_modes); `kernel_tolerance`:
-    largest ‖K R‖ relative to ‖K‖ ‖R‖.
     """
     weights = 1 / (1 + np.sqrt(np.arange(2, 2 + kernel.shape[1])))
     energy = np.abs(stiffness @ (kernel @ weights)).max(initial=0.0)
@@ -276,10 +273,7 @@ def skewed(nodes: np.ndarray) -> np.ndarray:
 
 
 def stiffness_of_cell(vertices: np.ndarray, element: Element, bind: Bind) -> tuple[np.ndarray, np.ndarray]:
-    """Return the stiffness of one cell, dense, and its points, both block by block.
-
-    `vertices`: coordinates in VTK order, shape (n, dim), [length].
-    """
+    """Return the stiffness of one cell, dense, and its points, both block by block."""
     mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], element.cells)
     space = _dolfinx.coefficient(mesh, "u", element.components).function_space
     nodes, dofs = _dolfinx.node_dofs(space)

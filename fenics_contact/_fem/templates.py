@@ -69,10 +69,7 @@ class Template:
         mesh: _dolfinx.mesh.Mesh | None = None,
         cells: Mapping[int, np.ndarray] | None = None,
     ) -> _dolfinx.fem.Form:
-        """Return the form on one mesh, with values for its constants and Functions for its coefficients.
-
-        `facets`: (cells, local facets) of its surface integral.
-        """
+        """Return the form on one mesh, with values for its constants and Functions for its coefficients."""
         mesh = spaces[0].mesh if mesh is None else mesh
         constants = {
             symbol: _dolfinx.fem.Constant(mesh, np.float64(value))
@@ -230,11 +227,7 @@ class CellPolynomials:
     """
 
     def __init__(self, points: np.ndarray, cells: np.ndarray, element: Element) -> None:
-        """Evaluate them at the Gauss points.
-
-        `points`: coordinates, shape (n, dim), [length]; `cells`: nodes of the cells in VTK order, shape
-        (n_cells, nodes of a cell).
-        """
+        """Evaluate them at the Gauss points."""
         cell = element.cell
         positions, weights = quadrature(cell, quadrature_degree(element))
         jacobian = jacobians(points, cells, positions)
@@ -255,12 +248,7 @@ class CellPolynomials:
         return part
 
     def coefficients(self, given: np.ndarray) -> np.ndarray:
-        """Return the coefficients of the projections of values at Gauss points.
-
-        `given`: shape (n_cells, n_gauss, k).
-
-        The result has shape (n_cells, n, k).
-        """
+        """Return the coefficients of the projections of values at Gauss points."""
         return np.asarray(self.inverse @ (self.values.swapaxes(1, 2) @ (self.weights[..., None] * given)))
 
     def projected(self, given: np.ndarray) -> np.ndarray:
