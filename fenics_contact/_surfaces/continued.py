@@ -16,11 +16,7 @@ from fenics_contact.mesh.faces import computed_rounding
 class Neighbour:
     """How a sector goes on behind one of its sides.
 
-    Attributes:
-        here: Nodes of the body on the side, shape (n,).
-        there: Nodes of the body on the other side, shape (m,).
-        points: Coordinates of all nodes of the body in the neighbour, where the others meet these, shape
-            (n_nodes, dim), [length].
+    `points`: coordinates of all nodes of the body in the neighbour, where the others meet these.
     """
 
     here: np.ndarray
@@ -33,9 +29,8 @@ def continued(
 ) -> FacetedSurface:
     """Return a surface with the normals and the relief that it has as a part of the whole.
 
-    Where the nodes of both sides do not lie on each other it stays as it is.
-
-    `order`: of the polynomials through the nodes, see `reconstructed`; None: the facets alone.
+    Where the nodes of both sides do not lie on each other it stays as it is. `order`: of the polynomials
+    through the nodes, see `reconstructed`; None: the facets alone.
     """
     nodes, count = surface.nodes, len(surface.nodes)
     points, facets, marks = [surface.points], [surface.facets], [surface.mirrored]

@@ -25,9 +25,8 @@ def sharp_nodes(mesh: BodyMesh, name: str, cuts: np.ndarray) -> np.ndarray:
     """Return which nodes of a surface, ascending, lie on corners or edges of the body, shape (n,).
 
     Facets of the body beside the surface count, too: a surface may end at an edge, see `is_crease`. It is
-    that of the mesh before any design moved it.
-
-    `cuts`: which nodes lie on sides where the body goes on, such as planes of symmetry, (n_nodes, n_sides).
+    that of the mesh before any design moved it. `cuts`: which nodes lie on sides where the body goes on, such
+    as planes of symmetry.
     """
     known = _KNOWN.setdefault(mesh.origin, {})
     key = name, cuts.tobytes()
@@ -39,9 +38,8 @@ def sharp_nodes(mesh: BodyMesh, name: str, cuts: np.ndarray) -> np.ndarray:
 def facing_area(mesh: BodyMesh, name: str, measure: Measure, share: float = 0.05) -> np.ndarray:
     """Return the area of each node of a surface, ascending, that is enough to face a master, shape (n,).
 
-    It is that of the mesh before any design moved it.
-
-    `share`: fraction of the node's area on the smallest facet around it.
+    It is that of the mesh before any design moved it. `share`: fraction of the node's area on the smallest
+    facet around it.
     """
     mesh = mesh.origin
     facets = linear_facets(mesh.linear.surfaces[name], mesh.dim).rows
@@ -70,10 +68,9 @@ def corners_over(
 ) -> tuple[np.ndarray, Projection]:
     """Return sharp nodes that touch another surface as corners do, and where they lie over it.
 
-    Where a face beside a corner lies flat on the other surface, nodes of that find it.
-
-    `sharp`: positions of nodes in ``surface.nodes``; `flat`: angle up to which a face lies flat, in degrees.
-    Facets of round bodies, whose joints may look like edges where cells are large, are not steeper there.
+    Where a face beside a corner lies flat on the other surface, nodes of that find it. `flat`: angle up to
+    which a face lies flat, in degrees. Facets of round bodies, whose joints may look like edges where cells
+    are large, are not steeper there.
     """
     hit = project(surface.points[sharp], surface.normals[sharp], other)
     cosine = float(np.cos(np.radians(flat)))
@@ -84,7 +81,6 @@ def corners_over(
 def _lie_flat(surface: FacetedSurface, node: np.ndarray, normal: np.ndarray, cosine: float) -> np.ndarray:
     """Return which nodes of a surface have a facet that lies flat on the other one, shape (n,).
 
-    `node`: positions in ``surface.nodes``, shape (n,); `normal`: of the other surface there, shape (n, dim);
     `cosine`: of the angle up to which facets lie flat.
     """
     areas = vector_areas(surface.points, surface.facets)

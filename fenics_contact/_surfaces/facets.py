@@ -24,13 +24,7 @@ from fenics_contact.mesh.faces import in_columns, is_triangle, narrowed, of_one_
 
 
 def quadrature_areas(points: np.ndarray, facets: np.ndarray, measure: Measure = PLAIN) -> np.ndarray:
-    """Return the areas of facets, in the plane the lengths of edges.
-
-    `points`: coordinates, shape (n_nodes, 3 or 2), [length]; `facets`: node numbers as in
-    `BodyMesh.surfaces`, shape (n_facets, nodes of a facet); `measure`: what is an area.
-
-    The result has shape (n_facets,), [length²] or [length].
-    """
+    """Return the areas of facets, in the plane the lengths of edges."""
     areas = np.empty(len(facets))
     for numbers, some in of_one_shape(facets):
         areas[numbers] = nodal_areas(points, some, measure).sum(axis=1)
@@ -41,8 +35,6 @@ def nodal_areas(points: np.ndarray, facets: np.ndarray, measure: Measure = PLAIN
     """Integrate the shape functions over every facet: nodal forces of a unit pressure.
 
     Two Gauss points per direction on linear facets, three on quadratic ones.
-
-    The result has shape (n_facets, nodes of a facet), [length²] or [length].
     """
     total = np.zeros(facets.shape)
     for at in gauss_points(points, facets, measure):
@@ -52,13 +44,7 @@ def nodal_areas(points: np.ndarray, facets: np.ndarray, measure: Measure = PLAIN
 
 @dataclass(frozen=True, eq=False)
 class SurfaceMoments:
-    """Area of a surface and its first moments.
-
-    Attributes:
-        area: A, [length²], in the plane [length].
-        centroid: c = ∫ x / A, shape (dim,), [length].
-        second_moment: ∫ (x − c)(x − c)ᵀ, shape (dim, dim), [length⁴], in the plane [length³].
-    """
+    """Area of a surface and its first moments."""
 
     area: float
     centroid: np.ndarray
@@ -85,11 +71,8 @@ def surface_moments(points: np.ndarray, facets: np.ndarray, measure: Measure = P
 class GaussPoint:
     """One point of a quadrature rule in every facet.
 
-    Attributes:
-        weight: Of the rule, times `Measure.around` in every facet, a number or (n_facets, 1).
-        values: Shape functions, shape (nodes of a facet,).
-        gradients: Their derivatives by the reference coordinates, shape (nodes of a facet, dim − 1).
-        tangents: Derivatives of the place by these, shape (n_facets, dim − 1, dim), [length].
+    `weight`: of the rule, times `Measure.around` in every facet, a number or (n_facets, 1); `tangents`:
+    derivatives of the place by these.
     """
 
     weight: float | np.ndarray
@@ -141,8 +124,6 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray, measure: Measure = PLA
 
     It is the nodal force of a unit pressure, but that of the corners of quadratic triangles, which vanishes
     on flat ones, is shared by their midpoints; see also `Measure.bearing`.
-
-    The result has shape (n_facets, nodes of a facet), [length²] or [length].
     """
     if is_triangle(facets).any():
         result = np.zeros(facets.shape)
@@ -185,10 +166,8 @@ def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
 
     At each corner the mean over the facets around it of ¾ (a + b) − ½ c, where a and b are the values at the
     midpoints beside it and c is that opposite: between the mean beside it and the linear function through all
-    three, so that quadratic fields on regular meshes are exact.
-
-    `facets`: node numbers, (n, nodes of a facet); values stay as they are unless there are six, and at
-    corners of quadrilaterals among triangles; `values`: values at nodes, (n_nodes,) or (n_nodes, k).
+    three, so that quadratic fields on regular meshes are exact. `facets`: node numbers; values stay as they
+    are unless there are six, and at corners of quadrilaterals among triangles.
     """
     if (both := is_triangle(facets)).any():
         filled = filled_at_corners(narrowed(facets[both]), values)
@@ -214,12 +193,7 @@ CUT = 0.5
 
 
 def facet_shape_values(local: np.ndarray, corners: int) -> np.ndarray:
-    """Evaluate only the values of the shape functions, at points of any leading shape; see `shape_functions`.
-
-    `local`: local coordinates, shape (..., dim − 1).
-
-    Returns values, shape (..., corners).
-    """
+    """Evaluate only the values of the shape functions, at points of any shape; see `shape_functions`."""
     if corners == 2:
         return np.asarray(0.5 * (1 + np.array([-1.0, 1.0]) * local), dtype=np.float64)
     s, t = local[..., 0], local[..., 1]
@@ -230,13 +204,7 @@ def facet_shape_values(local: np.ndarray, corners: int) -> np.ndarray:
 
 
 def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate the shape functions of facets with 4 (bilinear), 3 or 2 (linear) corners.
-
-    `local`: local coordinates, in [−1, 1]² for quadrilaterals, shape (n, 2), in the unit triangle for
-    triangles, shape (n, 2), in [−1, 1] for the edges of plane bodies, shape (n, 1).
-
-    Returns values, shape (n, corners), and derivatives, shape (n, corners, dim − 1).
-    """
+    """Evaluate the shape functions of facets with 4 (bilinear), 3 or 2 (linear) corners."""
     values = facet_shape_values(local, corners)
     if corners == 2:
         return values, np.broadcast_to(np.array([[-0.5], [0.5]]), (len(local), 2, 1))
@@ -295,17 +263,12 @@ class Relief:
     (Hermite interpolation along the edges, blended in between), plus corrections at the midpoints of the
     edges and in the middle of the facet. The error is of the fourth order in the size of the facets, of the
     sixth along arcs of circles. All entries are relative to the facets, so that they are unchanged when the
-    nodes move slightly: normals then rotate with those of the facets.
-
-    Attributes:
-        normals: True unit normals of the nodes less the averaged ones, shape (n, dim).
-        corners: The same for each corner of the facets, which differ where the surface has a crease, shape
-            (n_facets, corners, dim).
-        rest: Corrections of the cubics at the midpoints of the edges, from each corner to the next, and in
-            the middle, shape (n_facets, corners + 1); in the plane at the midpoint, (n_facets, 1), [length].
-        flattened: Number of facets left flat, as the surface over them would fold.
-        offsets: Height at the corners of facets, which is zero but at hanging nodes, shape (n_facets,
-            corners), [length]; None without any.
+    nodes move slightly: normals then rotate with those of the facets. `normals`: True unit normals of the
+    nodes less the averaged ones; `corners`: the same for each corner of the facets, which differ where the
+    surface has a crease; `rest`: corrections of the cubics at the midpoints of the edges, from each corner to
+    the next, and in the middle; in the plane at the midpoint; `flattened`: number of facets left flat, as the
+    surface over them would fold; `offsets`: height at the corners of facets, which is zero but at hanging
+    nodes; None without any.
     """
 
     normals: np.ndarray
@@ -405,10 +368,7 @@ class FacetedSurface:
         return replace(surface, areas=surface.areas_at(self.points))
 
     def areas_at(self, points: np.ndarray) -> np.ndarray:
-        """Return the areas that belong to the nodes where these lie elsewhere, shape (n,).
-
-        `points`: coordinates of the nodes, shape (n, dim), [length].
-        """
+        """Return the areas that belong to the nodes where these lie elsewhere, shape (n,)."""
         facets = self.bearing
         if facets is self.facets and not self.measure.varies:
             return self.widths_at(points)
@@ -453,9 +413,7 @@ def within_planes(
 ) -> np.ndarray:
     """Return vectors without their components across planes, shape (n, dim).
 
-    `vectors`: shape (n, dim); `marks`: planes in which each must lie, shape (n, n_planes); `planes`: their
-    unit normals, shape (n_planes, dim), the axes first; None: the axes alone; `same`: planes are the same if
-    the sine of the angle between them is below this.
+    `same`: planes are the same if the sine of the angle between them is below this.
     """
     dim = vectors.shape[1]
     result = np.where(marks[:, :dim], 0.0, vectors)
@@ -482,11 +440,7 @@ def faceted_surface(
     """Build the surface from the coordinates of a body and rows of its node numbers.
 
     On a plane of symmetry the average includes the facets of the mirror image: the normals lie in it.
-
-    `points`: coordinates, shape (n_nodes, 3), or (n_nodes, 2) where the facets are edges, [length]; `facets`:
-    node numbers of triangles, quadrilaterals or edges, shape (n_facets, 3, 4 or 2); `mirrored`: which nodes
-    lie on which plane of symmetry, shape (n_nodes, n_planes), by default none; `planes`: their normals, see
-    `FacetedSurface`.
+    `mirrored`: which nodes lie on which plane of symmetry, by default none.
     """
     corners, dim = facets.shape[1], points.shape[1]
     if (corners, dim) not in {(2, 2), (3, 3), (4, 3)}:
@@ -530,10 +484,7 @@ def _linear_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 class Heights:
     """Heights of the true surface at some points of facets.
 
-    Attributes:
-        value: The heights, shape (n,), [length].
-        by_local: Their derivatives by the local coordinates, shape (n, dim − 1).
-        by_slopes: Their derivatives by the slopes at the corners, see `slopes`, shape (n, corners, 2).
+    `by_slopes`: their derivatives by the slopes at the corners, see `slopes`.
     """
 
     value: np.ndarray
@@ -542,10 +493,7 @@ class Heights:
 
 
 def heights(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> Heights:
-    """Return the heights of the true surface over points of facets, along the interpolated normals.
-
-    `facet`: facet of each point, shape (n,); `local`: local coordinates on it, shape (n, dim − 1).
-    """
+    """Return the heights of the true surface over points of facets, along the interpolated normals."""
     relief = surface.relief
     if relief is None:
         shape = (len(facet), surface.corners, 2)
@@ -570,8 +518,6 @@ def slopes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
 
     The derivative of x(ξ) + h n(ξ) along an edge d is d + h' n at its ends; it lies in the tangent plane of
     the normal c where h' = −d·c / n·c.
-
-    `facet`: facets, shape (n,).
     """
     nodes, normals = surface.facets[facet], corner_normals(surface, facet)
     edges = edges_at_corners(surface.points[nodes])
@@ -594,8 +540,6 @@ def height_functions(
     local: np.ndarray, corners: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Evaluate the polynomials that multiply slopes and rests, and their derivatives.
-
-    `local`: local coordinates as for `shape_functions`, shape (n, dim − 1).
 
     Returns those of the slopes, shape (n, corners, 2), their derivatives, shape (n, corners, 2, dim − 1),
     those of the rests, shape (n, m), and their derivatives, shape (n, m, dim − 1).

@@ -13,19 +13,14 @@ import scipy.sparse as sp
 class PolynomialFit:
     """Polynomials without constant around centres, by least squares with the weights 1 / distance².
 
-    Nodes on two lines, as those of a surface one layer of facets wide, do not tell how it bends across:
-    there y² is nearly a linear function of y, and what is not is the nodes' unevenness. So of polynomials
-    that those of lower degree explain none is fitted. The surface is then straight in one direction: across
-    the lines, but along the rulings where a developable surface, which bends hardly more, goes through the
-    nodes: all of a cylinder or cone is found, however its strip lies. Only angles and curvatures decide, in
-    any axes.
-
-    Attributes:
-        centre: Centre of each pair of a centre and a node beside it, shape (n_pairs,).
-        terms: Powers of the node's coordinates times its weight, shape (n_pairs, n_powers).
-        inverse: From their sums times values to coefficients, shape (n_centres, n_powers, n_powers).
-        scale: Factors of the coefficients, shape (n_powers,). In terms of Bombieri's norm, in which powers of
-            a degree count by one over their binomial coefficient, the sum of squares is the same in all axes.
+    Nodes on two lines, as those of a surface one layer of facets wide, do not tell how it bends across: there
+    y² is nearly a linear function of y, and what is not is the nodes' unevenness. So of polynomials that
+    those of lower degree explain none is fitted. The surface is then straight in one direction: across the
+    lines, but along the rulings where a developable surface, which bends hardly more, goes through the nodes:
+    all of a cylinder or cone is found, however its strip lies. Only angles and curvatures decide, in any
+    axes. `terms`: powers of the node's coordinates times its weight; `inverse`: from their sums times values
+    to coefficients; `scale`: factors of the coefficients. In terms of Bombieri's norm, in which powers of a
+    degree count by one over their binomial coefficient, the sum of squares is the same in all axes.
     """
 
     centre: np.ndarray
@@ -39,10 +34,7 @@ class PolynomialFit:
     ) -> PolynomialFit:
         """Prepare the fit.
 
-        `place`: coordinates of nodes in the tangent planes of their centres, in sizes of the patches, shape
-        (n_pairs, dim − 1); `height`: their heights over these planes, likewise, shape (n_pairs,); `centre`:
-        centre of each, shape (n_pairs,); `narrow`: whether a centre and the nodes around it are all at the
-        rim, shape (n_centres,).
+        `narrow`: whether a centre and the nodes around it are all at the rim.
         """
         powers = powers_of(place.shape[1], order)
         scale = np.sqrt([comb(sum(power), power[-1]) for power in powers])
@@ -84,11 +76,7 @@ def _inverse_on(matrix: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 
 def _determined(sums: np.ndarray, degree: np.ndarray, narrow: np.ndarray) -> np.ndarray:
-    """Return projectors on the coefficients that are fitted, shape (n, n_powers, n_powers).
-
-    `sums`: matrices of the normal equations and their right sides, shape (n, n_powers, n_powers + 1);
-    `degree`: degrees of the powers, ascending, shape (n_powers,).
-    """
+    """Return projectors on the coefficients that are fitted, shape (n, n_powers, n_powers)."""
     matrix, kept = sums[:, :, :-1], np.zeros_like(sums[:, :, :-1])
     width = int(np.count_nonzero(degree == 1))
     kept[:, :width, :width] = np.eye(width)
@@ -111,11 +99,7 @@ def _explained(
 ) -> np.ndarray:
     """Return the polynomials of the highest degree that lower ones explain at the nodes.
 
-    `matrix`: inner products at the nodes, those of lower degrees first, shape (n, size, size); `kept`:
-    projectors on the lower ones that are fitted, shape (n, low, low); `narrow`: where one counts as explained
-    in any case, shape (n,).
-
-    Returns orthonormal columns, zero for those that are not explained, shape (n, size − low, size − low).
+    `kept`: projectors on the lower ones that are fitted; `narrow`: where one counts as explained in any case.
     """
     low = kept.shape[1]
     across, own = matrix[:, :low, low:], matrix[:, low:, low:]
@@ -134,8 +118,8 @@ def _explained(
 def _straight(found: np.ndarray, lost: np.ndarray, most: float = 1 / 3) -> np.ndarray:
     """Return the square of the coordinate along which each surface is straight, shape (n, 3).
 
-    `found`: quadratic parts of the surfaces without what is lost, shape (n, 3); `lost`: what the nodes leave
-    open, nearly the square of a coordinate, shape (n, 3).
+    `found`: quadratic parts of the surfaces without what is lost; `lost`: what the nodes leave open, nearly
+    the square of a coordinate.
     """
     bend, free = _matrices(found), _matrices(lost)
     # The smallest s for which det(bend + s free) = 0.

@@ -15,11 +15,8 @@ from fenics_contact.mesh.linear_facets import LinearFacets
 class MixedPieces:
     """How triangles are pieces of triangles and quadrilaterals of one surface.
 
-    Attributes:
-        owner: Facet that each is a piece of, ascending, shape (n,).
-        number: Which of its pieces it is, see `LinearFacets`, shape (n,).
-        flat: Corners of the linear quadrilateral that each is half of, in the mean plane of this, relative to
-            its middle, shape (n, 4, 2), [length]; zero for triangles.
+    `number`: which of its pieces it is, see `LinearFacets`; `flat`: corners of the linear quadrilateral that
+    each is half of, in the mean plane of this, relative to its middle; zero for triangles.
     """
 
     owner: np.ndarray
@@ -28,10 +25,7 @@ class MixedPieces:
 
     @classmethod
     def of(cls, points: np.ndarray, whole: np.ndarray, cut: LinearFacets) -> MixedPieces:
-        """Return those of facets.
-
-        `points`: coordinates, (n_nodes, 3); `whole`: the facets, (n_facets, 4 | 9); `cut`: their pieces.
-        """
+        """Return those of facets."""
         halved = ~is_triangle(whole)[cut.owner]
         kind, flat = FACET_TYPES[whole.shape[1], 3], np.zeros((len(cut.owner), 4, 2))
         corners = kind.pieces[cut.number[halved] // 2]

@@ -24,12 +24,8 @@ def local_coordinates(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
     """Invert the (bi)linear map of flat facets.
 
     A bilinear map x = c + a s + b t + d s t becomes s + d₁ s t = s₀, t + d₂ s t = t₀ in the axes (a, b). The
-    product p = s t solves d₁ d₂ p² − (1 + d₂ s₀ + d₁ t₀) p + s₀ t₀ = 0; of its roots the one that tends to
-    s₀ t₀ for d → 0 belongs to the inside of a convex facet.
-
-    `points`: points of each facet, shape (n, q, dim − 1); `flat`: corners, shape (n, corners, dim − 1).
-
-    Returns local coordinates as `shape_functions` takes them, shape (n, q, dim − 1).
+    product p = s t solves d₁ d₂ p² − (1 + d₂ s₀ + d₁ t₀) p + s₀ t₀ = 0; of its roots the one that tends to s₀
+    t₀ for d → 0 belongs to the inside of a convex facet.
     """
     corners = flat.shape[1]
     if corners == 2:
@@ -63,12 +59,8 @@ def _affine(away: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 class _Places:
     """Some points on pieces of facets of one shape.
 
-    Attributes:
-        points: Which they are: numbers, or all.
-        columns: Nodes of their facets among the columns of these.
-        kind: Type of the facets.
-        local: Reference coordinates, (m, dim − 1).
-        arms: Vectors a with δξ = Σ_k δλ_k a_k for the piece's shape functions λ, (m, corners, dim − 1).
+    `columns`: nodes of their facets among the columns of these; `arms`: vectors a with δξ = Σ_k δλ_k a_k for
+    the piece's shape functions λ, (m, corners, dim − 1).
     """
 
     points: np.ndarray | slice
@@ -119,10 +111,7 @@ def _halved(
 
 
 def whole_nodes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
-    """Return the nodes of the whole facets that pieces belong to, shape (m, nodes of a facet).
-
-    `facet`: numbers of pieces, (m,).
-    """
+    """Return the nodes of the whole facets that pieces belong to, shape (m, nodes of a facet)."""
     assert surface.whole is not None
     if surface.mixed is not None:
         return np.asarray(surface.whole[surface.mixed.owner[facet]])
@@ -133,9 +122,6 @@ def shape_weights(
     surface: FacetedSurface, facet: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes of whole facets and their weights at points of linear pieces.
-
-    `facet`: numbers of pieces, (m,); `weights`: linear shape functions of the pieces at the points, (m,
-    corners).
 
     Returns node numbers and shape functions of the whole facets, (m, nodes of a facet) each; of triangles
     among quadrilaterals those of nodes that are listed again are zero.
@@ -156,13 +142,7 @@ def _put(result: np.ndarray, at: _Places, values: np.ndarray) -> None:
 def shape_weight_gradients(
     surface: FacetedSurface, facet: np.ndarray, weights: np.ndarray, gradients: np.ndarray
 ) -> np.ndarray:
-    """Return the derivatives of the weights that `shape_weights` returns by the pieces' local coordinates.
-
-    `facet`: numbers of pieces, (m,); `weights`: linear shape functions of the pieces at the points, (m,
-    corners); `gradients`: their derivatives, (m, corners, dim − 1).
-
-    The result has shape (m, nodes of a facet, dim − 1).
-    """
+    """Return the derivatives of the weights that `shape_weights` returns by the pieces' local coordinates."""
     assert surface.whole is not None
     result = np.zeros((len(facet), surface.whole.shape[1], gradients.shape[2]))
     for at in _Places.of(surface, facet, weights):
@@ -174,12 +154,7 @@ def shape_weight_gradients(
 def shape_weights_pulled_back(
     surface: FacetedSurface, facet: np.ndarray, weights: np.ndarray, by: np.ndarray
 ) -> np.ndarray:
-    """Vector-Jacobian product of the functions that `shape_weights` returns with respect to ``weights``.
-
-    `by`: derivative by the functions, (m, nodes of a facet).
-
-    The result has shape (m, corners).
-    """
+    """Vector-Jacobian product of the functions that `shape_weights` returns with respect to ``weights``."""
     result = np.zeros(weights.shape)
     for at in _Places.of(surface, facet, weights):
         gradients = shape_gradients(at.kind, at.local)

@@ -28,14 +28,9 @@ MARGIN = 0.1
 class Projection:
     """Projections of points. Only points that have a projection are listed.
 
-    Attributes:
-        point: Numbers of the points, ascending, shape (n,).
-        facet: Facet hit, shape (n,).
-        local: Local coordinates on it, shape (n, dim − 1).
-        gap: Signed distance from the true surface along the normal, positive outside, shape (n,), [length].
-        normal: Interpolated outward unit normal there, shape (n, dim).
-        beside: Distance outside its facet, in local coordinates, shape (n,); 0 for rounding.
-        lost: Points that face a facet but have no projection, ascending, shape (n_lost,).
+    `local`: local coordinates on it; `gap`: signed distance from the true surface along the normal, positive
+    outside; `beside`: distance outside its facet, in local coordinates; 0 for rounding; `lost`: points that
+    face a facet but have no projection, ascending.
     """
 
     point: np.ndarray
@@ -65,12 +60,7 @@ def node_weights(surface: FacetedSurface, hit: Projection) -> sp.csr_matrix:
 
 
 def interpolated_normal(weights: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate unit normals and scale back to unit length.
-
-    `weights`: shape functions, shape (n, corners); `normals`: nodal normals, shape (n, corners, dim).
-
-    Returns unit normals, shape (n, dim), and the lengths before scaling, shape (n,).
-    """
+    """Interpolate unit normals and scale back to unit length."""
     mean = np.einsum("nk,nkd->nd", weights, normals)
     length = np.linalg.norm(mean, axis=1)
     return mean / length[:, None], length
@@ -101,8 +91,6 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     and weights while a point slides from facet to facet. Of several projections that with the smallest ``|h +
     g|`` is used; surfaces that face the same way do not touch. Points without any that lie beside the surface
     by no more than a twentieth of a facet's width are projected on the facet's continuation.
-
-    `points`: slave nodes, shape (n, dim), [length]; `normals`: their outward unit normals, shape (n, dim).
     """
     corners = master.points[master.facets]
     centroids = corners.mean(axis=1)
@@ -118,10 +106,7 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
 
 
 def nearest_facets(tree: cKDTree, points: np.ndarray, nearest: int = 9) -> tuple[np.ndarray, np.ndarray]:
-    """Pair every point with the facets whose centroids are nearest: numbers of points and of facets.
-
-    `nearest`: facets tried for each point in the first round, nearest centroids first.
-    """
+    """Pair every point with the facets whose centroids are nearest: numbers of points and of facets."""
     ranks = np.arange(min(nearest, tree.n)) + 1
     _, facets = tree.query(points, k=ranks)
     return np.repeat(np.arange(len(points)), len(ranks)), facets.ravel()
@@ -243,10 +228,9 @@ def surfaces_match(
     """Return whether the facets of two surfaces are the same where the surfaces meet.
 
     Their nodes lie over each other along the slave's normals, also across a gap, and no slave node without
-    such a partner meets the master. Then contact by nodes passes the patch test.
-
-    `near`: how far nodes may be apart, relative to the shortest edge of their facets; `first`: number of
-    nodes that are projected first, those nearest to the master: one that meets it decides.
+    such a partner meets the master. Then contact by nodes passes the patch test. `near`: how far nodes may be
+    apart, relative to the shortest edge of their facets; `first`: number of nodes that are projected first,
+    those nearest to the master: one that meets it decides.
     """
     mine, theirs = _matched_facets(slave, master)
     if mine.shape[1] != theirs.shape[1]:

@@ -25,16 +25,10 @@ class SurfaceTangents:
     """Tangents along the edges at every corner, to the next corner and to the one before.
 
     All tangents at a node are combinations of the same dim − 1 derivatives, so that they stay in one plane
-    whatever becomes of the nodes.
-
-    Attributes:
-        bends: By which weights of the nodes they differ from the facets' edges, shape (n_facets · corners ·
-            2, n_nodes); rows sum to zero.
-        derivatives: Weights of the nodes in the derivatives along the axes of each wedge, shape (n_wedges ·
-            (dim − 1), n_nodes).
-        of_corner: Wedge of each corner, shape (n_facets, corners).
-        shares: Shares of the derivatives in the tangents, shape (n_facets, corners, 2, dim − 1).
-        smooth: Whether they are such combinations; the others are straight, shape (n_facets, corners, 2).
+    whatever becomes of the nodes. `bends`: by which weights of the nodes they differ from the facets' edges;
+    rows sum to zero; `derivatives`: weights of the nodes in the derivatives along the axes of each wedge;
+    `of_corner`: wedge of each corner; `shares`: shares of the derivatives in the tangents; `smooth`: whether
+    they are such combinations; the others are straight.
     """
 
     bends: sp.csr_matrix
@@ -92,10 +86,7 @@ def _axes(surface: FacetedSurface, wedges: Wedges) -> np.ndarray:
 def _fitted_derivatives(
     surface: FacetedSurface, wedges: Wedges, axes: np.ndarray, order: int
 ) -> sp.csr_matrix:
-    """Return weights of the nodes in the derivatives of fitted positions along the axes of wedges.
-
-    The result has shape (n_wedges · (dim − 1), n_nodes).
-    """
+    """Return weights of the nodes in the derivatives of fitted positions along the axes of wedges."""
     node, count, dim = wedges.node, len(wedges.node), surface.dim
     centre, around, narrow = wedges.patches(order)
     away = surface.points[node[around]] - surface.points[node[centre]]

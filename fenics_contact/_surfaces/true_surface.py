@@ -100,10 +100,7 @@ def without_folds(surface: FacetedSurface) -> FacetedSurface:
 class Joints:
     """Edges between two facets, in the plane the nodes between two edges.
 
-    Attributes:
-        facets: The facets on both sides, shape (n, 2).
-        corners: Their corners that meet there, numbered facet by facet, shape (n, 2, ends).
-        angle: Angle between the two, shape (n,), in radians.
+    `corners`: their corners that meet there, numbered facet by facet.
     """
 
     facets: np.ndarray
@@ -117,11 +114,8 @@ class Joints:
 class Wedges:
     """Corners of facets that meet at a node without a crease in between.
 
-    Attributes:
-        of_corner: Wedge of each corner, shape (n_facets, corners).
-        node: Node of each wedge, shape (n_wedges,).
-        mirrored: Planes of symmetry across which it continues smoothly, shape (n_wedges, n_planes).
-        rim: Whether it ends at an edge, the surface's or a crease, shape (n_wedges,).
+    `mirrored`: planes of symmetry across which it continues smoothly; `rim`: whether it ends at an edge, the
+    surface's or a crease.
     """
 
     of_corner: np.ndarray
@@ -191,10 +185,8 @@ def is_crease(
 
     A smooth surface turns by similar angles at the next parallel joints on both sides; where it turns by
     several times as much as at one of them, and by more than at the others there, it has a crease, however
-    shallow.
-
-    `rounding`: angles below this count as zero, in radians; `parallel`: edges are parallel if the cosine of
-    the angle between them is above this.
+    shallow. `rounding`: angles below this count as zero, in radians; `parallel`: edges are parallel if the
+    cosine of the angle between them is above this.
     """
     nodes = surface.facets.ravel()[joints.corners[:, 0]]
     count, size = nodes.shape[0], len(surface.nodes)
@@ -290,9 +282,7 @@ def _fit_around(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return vectors along the normals and the second derivatives of surfaces through the nodes around some.
 
-    `away`: from the centre of a patch to its nodes, shape (n_pairs, dim); `centre`: which it is, shape
-    (n_pairs,); `mean`: mean normals at the centres, shape (n, dim); `axes`: axes of the planes across, shape
-    (n, dim − 1, dim); `narrow`: as for `PolynomialFit`.
+    `away`: from the centre of a patch to its nodes; `axes`: axes of the planes across.
     """
     count, width = axes.shape[:2]
     size = np.zeros(count)
@@ -356,9 +346,8 @@ def true_surface(
 ) -> FacetedSurface:
     """Return a surface of a mesh with its normals and its relief: linear facets through its nodes.
 
-    `mirrored`: which nodes lie on which plane of symmetry, shape (n_nodes, n_planes); `planes`: their
-    normals, see `FacetedSurface`; `finer`: use a better representation, to estimate the error: the shape, or
-    a reconstruction of the next order.
+    `finer`: use a better representation, to estimate the error: the shape, or a reconstruction of the next
+    order.
     """
     marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks, planes)
@@ -427,10 +416,7 @@ def by_shape(
 
     Nodes slightly off the shape are not moved; the heights between them are relative to them, but for hanging
     nodes, which lie on larger facets. Where several shapes meet in a crease, or one its mirror image, each
-    facet uses its own.
-
-    `shape`: the shape; `hangs`: marks of hanging nodes, shape (n,), None without any; `sharp`: largest angle
-    in radians between the normals of shapes that meet smoothly.
+    facet uses its own. `sharp`: largest angle in radians between the normals of shapes that meet smoothly.
     """
     parts = _parts(shape, surface.points[surface.facets].mean(axis=1))
     corners = np.zeros((*surface.facets.shape, surface.dim))
@@ -520,12 +506,7 @@ def sample_points(corners: int) -> np.ndarray:
 def height_over(
     points: np.ndarray, directions: np.ndarray, shape: SurfaceShape, max_steps: int = 12
 ) -> np.ndarray:
-    """Return the distances from points along directions to a shape, shape (n,), [length].
-
-    `points`: points near the shape, shape (n, dim), [length]; `directions`: unit vectors that point out of
-    it, shape (n, dim); `shape`: the shape; `max_steps`: Newton steps along a ray to a shape; distances are
-    nearly linear there.
-    """
+    """Return the distances from points along directions to a shape, shape (n,), [length]."""
     height = np.zeros(len(points))
     for _ in range(max_steps):
         place = points + height[:, None] * directions
