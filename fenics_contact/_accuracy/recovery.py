@@ -73,10 +73,7 @@ class Polynomials:
         return np.asarray(tensors[(slice(None), *index)] * self._places[1][:, None])
 
     def turned(self, tensors: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        """Return Σ t_i..j T_ia ... T_jb: highest derivatives by coordinates x of those by T x.
-
-        `turn`: T.
-        """
+        """Return Σ t_i..j T_ia ... T_jb: highest derivatives by coordinates x of those by T x."""
         for axis in range(1, self.degree + 1):
             front = np.moveaxis(tensors, axis, 1)
             flat = front.reshape(len(front), self.dim, front[0, 0].size if len(front) else 0)
@@ -171,10 +168,7 @@ CHUNK = 2_000_000
 
 @dataclass(frozen=True)
 class Moments:
-    """Normal equations of the fits of some sites, in the coordinates of their patches.
-
-    `matrix`: shape (n, m, m), its trace of order one, with m polynomials.
-    """
+    """Normal equations of the fits of some sites, in the coordinates of their patches."""
 
     rows: np.ndarray
     matrix: np.ndarray

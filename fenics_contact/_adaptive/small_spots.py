@@ -91,10 +91,7 @@ class _Spot:
 
 
 def cells_at(mesh: BodyMesh, places: np.ndarray, wide: float, around: float = 0.0) -> np.ndarray:
-    """Return the cells that may reach some places and are wider than some length.
-
-    `around`: how far from a place they may lie.
-    """
+    """Return the cells that may reach some places and are wider than some length."""
     corners = mesh.points[mesh.cells]
     middle = corners.mean(axis=1)
     reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)

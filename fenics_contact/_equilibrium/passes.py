@@ -16,10 +16,7 @@ Solve = Callable[[TornSystem, LinearState | None], LinearState]
 
 
 class Passes:
-    """Passes so far, each of which starts from the last.
-
-    `count`: how many there were.
-    """
+    """Passes so far, each of which starts from the last."""
 
     def __init__(self, solve: Solve, known: State | None) -> None:
         """Start from a known state, if it is one of linear materials."""

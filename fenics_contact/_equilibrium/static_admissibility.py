@@ -134,10 +134,7 @@ def rigid_bodies(torn: TornSystem, *, sprung: bool = True) -> list[RigidBody]:
 
 
 class RigidBody:
-    """A body regarded as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it.
-
-    `part`: marks of the nodes of a part of it; all by default.
-    """
+    """A body regarded as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
 
     def __init__(
         self, torn: TornSystem, index: int, part: np.ndarray | None = None, *, sprung: bool = True

@@ -319,10 +319,7 @@ def temperature_of(loads: Iterable[Load], body: str) -> Temperature:
 
 @dataclass(frozen=True)
 class AtRest:
-    """What stresses a body that does not move.
-
-    `temperature`: ΔT (UFL), None without one; `stress`: initial stress, 3 x 3 (UFL), None without one.
-    """
+    """What stresses a body that does not move."""
 
     temperature: Expr | None
     stress: Expr | None

@@ -132,10 +132,7 @@ class LinearTraction:
 
 @dataclass(frozen=True)
 class TwistingTraction:
-    """A traction on a body of revolution that grows around the axis with the radius, a + b r e_θ.
-
-    `even`: a; `turning`: b.
-    """
+    """A traction on a body of revolution that grows around the axis with the radius, a + b r e_θ."""
 
     even: GivenVector
     turning: float

@@ -143,10 +143,7 @@ class _StiffAlone:
 @displayed
 @dataclass(frozen=True, eq=False)
 class TangentStep:
-    """One Newton step.
-
-    `motions`: β, replicated.
-    """
+    """One Newton step."""
 
     multiplier: Vector
     motions: Vector
@@ -164,10 +161,7 @@ def tangent_step(
     *,
     margin: float = 0.0,
 ) -> TangentStep | None:
-    """Solve the face that the natural map selects; None where it does not hold every body. Collective.
-
-    `floor`: A residual that is small enough.
-    """
+    """Solve the face that the natural map selects; None where it does not hold every body. Collective."""
     factor = None if tangent.problem.scaling is None else tangent.problem.scaling.factor
     at = tangent.scaled()
     problem = at.problem

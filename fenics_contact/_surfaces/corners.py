@@ -79,10 +79,7 @@ def corners_over(
 
 
 def _lie_flat(surface: FacetedSurface, node: np.ndarray, normal: np.ndarray, cosine: float) -> np.ndarray:
-    """Return which nodes of a surface have a facet that lies flat on the other one, shape (n,).
-
-    `cosine`: of the angle up to which facets lie flat.
-    """
+    """Return which nodes of a surface have a facet that lies flat on the other one, shape (n,)."""
     areas = vector_areas(surface.points, surface.facets)
     areas = areas / np.maximum(np.linalg.norm(areas, axis=1), np.finfo(float).tiny)[:, None]
     place = np.full(len(surface.nodes), -1)

@@ -386,10 +386,7 @@ def _row_fields(torn: TornSystem, fields: PairedFields) -> RowFields:
 def _by_point(
     points: ContactPoints, rows: RowFields, mine: np.ndarray, corners: np.ndarray | None = None
 ) -> PointDerivatives:
-    """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g; rows −n·rel(v) and t·rel(v), rel(v) = v_s − Σ w_j v_j.
-
-    `mine`: the points to differentiate; `corners`: displacements of the corners of their master facets.
-    """
+    """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g; rows −n·rel(v) and t·rel(v), rel(v) = v_s − Σ w_j v_j."""
     force, friction, relative = rows.normal[:, mine], rows.friction[:, mine], rows.relative[:, mine]
     normal = np.einsum("kn,knd->nd", force, relative)
     tangents = -np.einsum("kna,knd->nad", friction, relative)

@@ -24,10 +24,7 @@ from fenics_contact.results.deformed_state import AnyState
 
 
 class JointProblem(DesignProblem[JointPoint]):
-    """A design problem with several states a design.
-
-    `objectives`: name of each case, or of each step that has one -> its objective.
-    """
+    """A design problem with several states a design."""
 
     problems: dict[str, ShapeProblem]
     objectives: dict[str, Objective]

@@ -29,10 +29,7 @@ from fenics_contact.mesh.faces import of_one_shape
 def normals_pulled_back(
     surface: FacetedSurface, by_normals: np.ndarray, by_averaged: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Vector-Jacobian product of the unit normals with respect to the surface's nodes, shape (n, dim).
-
-    `by_averaged`: direct derivative by each averaged normal.
-    """
+    """Vector-Jacobian product of the unit normals with respect to the surface's nodes, shape (n, dim)."""
     along = np.einsum("nd,nd->n", surface.normals, by_normals)
     by_true = by_normals - along[:, None] * surface.normals
     if surface.relief is not None:

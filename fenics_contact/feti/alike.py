@@ -123,10 +123,7 @@ class Kind:
         return blocks
 
     def references(self, near: float) -> np.ndarray:
-        """Return as many nodes as there are dimensions, in independent directions and with rare marks.
-
-        `near`: marks that differ by less are the same.
-        """
+        """Return as many nodes as there are dimensions, in independent directions and with rare marks."""
         order = np.argsort(self.marks)
         group = np.empty(len(order), dtype=np.int64)
         group[order] = np.cumsum(np.diff(self.marks[order], prepend=self.marks[order[0]]) > near)

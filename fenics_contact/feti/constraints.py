@@ -165,10 +165,7 @@ class ConstraintRows(Joint):
         return values
 
     def check(self, scene: Scene, prescribed: np.ndarray, moving: sp.csr_matrix, near: float = 1e-6) -> None:
-        """Reject equations that contradict others or supports.
-
-        `moving`: free motions of rigid surfaces on nodes; `near`: of values, relative to the largest.
-        """
+        """Reject equations that contradict others or supports."""
         if not self.left_out:
             return
         values, given = self._values(scene.constraints), self.equations @ self.moved(prescribed)

@@ -32,10 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Relations(RowGroup):
-    """The relative displacement that each row measures: d·(u_slave − Σ w_j u_master,j).
-
-    `which`: point of each row; `directions`: d of each row.
-    """
+    """The relative displacement that each row measures: d·(u_slave − Σ w_j u_master,j)."""
 
     points: ContactPoints
     which: np.ndarray

@@ -87,10 +87,7 @@ class Tearing(NodeNumbers):
 def tear(
     scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, stiffness: Mapping[str, np.ndarray]
 ) -> Tearing:
-    """Cut the bodies along a partition of their cells and distribute the subdomains over ranks.
-
-    `stiffness`: body name -> typical nodal stiffness of every cell.
-    """
+    """Cut the bodies along a partition of their cells and distribute the subdomains over ranks."""
     numbers = NodeNumbers.of(scene)
     names, node_offset = numbers.body_names, numbers.node_offset
     counts = [int(partitions[name].max()) + 1 for name in names]

@@ -210,10 +210,7 @@ def regularised(stiffness: sp.csr_matrix, kernel: np.ndarray, points: np.ndarray
 
 
 def fixing_dofs(points: np.ndarray, count: int = FIXING_NODES, components: int | None = None) -> np.ndarray:
-    """Return the dofs of well-spread nodes, ascending, shape (n_dofs,); see `fixing_nodes`.
-
-    `components`: dofs of a node; by default as many as it has coordinates.
-    """
+    """Return the dofs of well-spread nodes, ascending, shape (n_dofs,); see `fixing_nodes`."""
     nodes, width = np.sort(fixing_nodes(points, count)), components or points.shape[1]
     return np.asarray((width * nodes[:, None] + np.arange(width)).ravel())
 

@@ -60,10 +60,7 @@ class FreeMotions:
         return replace(self, columns=columns, load=np.concatenate([self.load, own.load]))
 
     def on_contact_rows(self, kept: sp.csr_matrix, groups: RowGroups, owned: np.ndarray) -> FreeMotions:
-        """Return those of a system on the rows of other contact points.
-
-        `kept`: picks rows that stay.
-        """
+        """Return those of a system on the rows of other contact points."""
         columns = (kept @ self.columns).tocsr()
         if self.nodes is None:
             return replace(self, columns=columns)

@@ -350,10 +350,7 @@ class TornInverse:
         previous: TornInverse | None = None,
         shared: bool = True,
     ) -> None:
-        """Factor the subdomains.
-
-        `shared`: whether those that are alike share factors.
-        """
+        """Factor the subdomains."""
         self.offset = np.cumsum([0] + [subdomain.mesh.size for subdomain in subdomains])
         self._subdomains, self._kind, self._insides = tuple(subdomains), kind, Insides()
         touched = np.zeros(self.offset[-1], dtype=bool)

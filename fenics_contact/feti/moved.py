@@ -13,10 +13,7 @@ from fenics_contact.feti.subdomain import LocalOperator
 
 
 class SharedOperator(LocalOperator, Protocol):
-    """One that also serves several subdomains at once.
-
-    `pays_from`: number of subdomains from which this is faster than one after the other.
-    """
+    """One that also serves several subdomains at once."""
 
     pays_from: int
 

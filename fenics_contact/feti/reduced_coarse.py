@@ -88,10 +88,7 @@ class ReducedGrams:
     def square(
         self, moving: sp.csr_matrix, tested: sp.csr_matrix, singular: float = 1e-10
     ) -> ReducedInverse | None:
-        """Return (A + G_u G_sᵀ)⁻¹, None if its reciprocal condition is below ``singular``. Collective.
-
-        `moving`: contact columns of G_u; `tested`: those of G_s.
-        """
+        """Return (A + G_u G_sᵀ)⁻¹, None if its reciprocal condition is below ``singular``. Collective."""
         inverse = self._inverse((moving @ tested.T).tocsr(), _square)
         return inverse if inverse.condition > singular else None
 

@@ -25,10 +25,7 @@ from fenics_contact.feti.ties import JoinedPoints
 
 @dataclass(frozen=True, eq=False)
 class SpringRows(JoinedPoints):
-    """Rows of springs, each of which is a point.
-
-    `stiffness`: k; `tension`: N₀.
-    """
+    """Rows of springs, each of which is a point."""
 
     balanced_as = "beds"
     #: Springs of a scene that have such rows.

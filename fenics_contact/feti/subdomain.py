@@ -478,10 +478,7 @@ def _from_own_origin(points: np.ndarray) -> np.ndarray:
 
 
 def kernel_of_body(body: Body, points: np.ndarray, materials: Sequence[Material] | None = None) -> np.ndarray:
-    """Return the modes without energy of a body at points, (n, dim, n_modes).
-
-    `materials`: those at the points; all of the body by default.
-    """
+    """Return the modes without energy of a body at points, (n, dim, n_modes)."""
     if isinstance(body, ToolBody):
         return body.kernel(points)
     return common_kernel(body.materials if materials is None else materials, points, body.kinematics)

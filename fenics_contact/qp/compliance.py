@@ -185,10 +185,7 @@ class Compliance:
         return float(normal + 0.5 * self.slip @ np.einsum("ia,ia->i", tau, tau))
 
     def resolve(self, feasible: FeasibleSet, trial: Vector, step: Vector) -> Vector:
-        """Return the force that the law gives to w = λ − ρ r, the resolvent of C + ∂I_Λ, owned.
-
-        `trial`: w, owned; `step`: ρ, owned.
-        """
+        """Return the force that the law gives to w = λ − ρ r, the resolvent of C + ∂I_Λ, owned."""
         layout, softened = self.layout, np.array(trial)
         softened[layout.tangential] = trial[layout.tangential] / self._slip_stiffening(step)[:, None]
         force = feasible.project(softened)

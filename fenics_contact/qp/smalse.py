@@ -41,10 +41,7 @@ class Mpgp:
 
 @dataclass(frozen=True, eq=False)
 class BoundedQuadratic:
-    """½ xᵀA x − bᵀx over a feasible set.
-
-    `operator`: A, symmetric positive semidefinite, owned to owned, collective; `rhs`: b, owned.
-    """
+    """½ xᵀA x − bᵀx over a feasible set."""
 
     comm: MPI.Comm
     operator: Operator
