@@ -18,6 +18,7 @@ from fenics_contact import (
 )
 from fenics_contact._pairing.inside import Deepest, GapsAt, InFacets, InsideOf, deepest_points, points_inside
 from fenics_contact._pairing.search import find_contact_points
+from fenics_contact._scene.local_axes import NO_AXES
 from fenics_contact.gallery import block, half_disc, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic, refined
@@ -203,7 +204,7 @@ def test_points_inside_facets_lie_in_the_master_by_their_reliefs_and_slide_acros
     nearest = np.flatnonzero(points.slave == of.nodes[of.slave.facets[facet[0]][0]])
     assert abs(points.normal[nearest[0], 2]) < np.abs(points.normal[nearest[0], :2]).min()
     chosen = InFacets(nearest, facet, middle, np.array([0.02]))
-    found = points_inside(of.scene, points, chosen, held, None)
+    found = points_inside(of.scene, points, chosen, held, NO_AXES)
     np.testing.assert_array_equal(found.are_inside, nearest)
     place = (found.own[nearest] @ of.scene.points)[0] - (0.0, 0.0, -0.3)  # from the centre of the ball
     np.testing.assert_allclose(place, (0.0, 0.0, 0.3), atol=1e-12)
@@ -235,7 +236,7 @@ def test_points_inside_facets_have_the_planes_of_symmetry_of_their_places(turn: 
     distance = of.scene.points[nodes] @ across
     which = [np.flatnonzero(points.slave == nodes[k(distance)])[0] for k in (np.argmin, np.argmax)]
     chosen = InFacets(np.array(which), np.full(2, facet), np.array([0.0 * end, end]), np.zeros(2))
-    found = points_inside(of.scene, points, chosen, held, None)
+    found = points_inside(of.scene, points, chosen, held, NO_AXES)
     marks = [each.symmetric if turn == 0.0 else each.tilted for each in (points, found)]
     assert marks[0] is not None
     assert marks[1] is not None
