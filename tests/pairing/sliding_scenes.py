@@ -7,6 +7,7 @@ import numpy as np
 from fenics_contact import Body, BodyMesh, ContactPair, Scene, Support, Surface
 from fenics_contact._pairing.sliding.contact import SlidingContact
 from fenics_contact._pairing.sliding.points import SlidingPoints
+from fenics_contact._pairing.sliding.surfaces import OnPatches
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import quadratic
@@ -93,6 +94,13 @@ def free(scene: Scene) -> np.ndarray:
 def sliding(scene: Scene, reach: float = np.inf) -> SlidingContact:
     """Return the contact of a scene without supports."""
     return SlidingContact.of(scene, free(scene), reach=reach)
+
+
+def on_patches(contact: SlidingContact) -> OnPatches:
+    """Return the first pair, of nodes on the patches of a body."""
+    meeting = contact.meetings[0]
+    assert isinstance(meeting, OnPatches)
+    return meeting
 
 
 def shaken(scene: Scene, amount: float = 0.02, seed: int = 3) -> np.ndarray:

@@ -20,7 +20,7 @@ from fenics_contact._surfaces.true_surface import true_surface
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import quadratic
 from fenics_contact.mesh.cell_types import FACET_TYPES, quadrature
-from tests.pairing.sliding_scenes import on_arch, shaken, sliding
+from tests.pairing.sliding_scenes import on_arch, on_patches, shaken, sliding
 
 CELLS = ("hexahedron", "tetrahedron")
 #: Places along an edge.
@@ -30,8 +30,7 @@ ALONG = np.array([0.0, 0.01, 0.3, 0.5, 0.8, 1.0])
 def shaken_patches(kind: str, order: int) -> tuple[SmoothPatches, np.ndarray]:
     """Return the patches of an arch and its nodes out of shape, unevenly."""
     scene = on_arch(kind, master_cells=8 // order, order=order)
-    meeting = sliding(scene).meetings[0]
-    assert meeting.patches is not None
+    meeting = on_patches(sliding(scene))
     x = shaken(scene)[meeting.master_nodes]
     return meeting.patches, x + 0.03 * np.sin(9.0 * x[:, ::-1]) * np.cos(7.0 * x)
 

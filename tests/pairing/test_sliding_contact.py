@@ -14,9 +14,12 @@ from fenics_contact._pairing.points import movable
 from fenics_contact._pairing.search import find_contact_points
 from fenics_contact._pairing.sliding.closest import ClosestPoints
 from fenics_contact._pairing.sliding.contact import SlidingContact
+from fenics_contact._pairing.sliding.meeting import Moved
 from fenics_contact._pairing.sliding.patches import SmoothPatches
 from fenics_contact._pairing.sliding.points import SlidingPoints
+from fenics_contact._pairing.sliding.slip import LastPoints, MaterialPoints
 from fenics_contact._pairing.sliding.stiffness import spread
+from fenics_contact._pairing.sliding.surfaces import OnItself, OnOwnBody
 from fenics_contact._surfaces.facets import faceted_surface
 from fenics_contact._surfaces.projection import Projection
 from fenics_contact.errors import InvalidInputError
@@ -27,6 +30,7 @@ from tests.pairing.sliding_scenes import (
     free,
     half_on_arch,
     on_arch,
+    on_patches,
     ring,
     rotation,
     same_points,
@@ -59,10 +63,9 @@ def squashed_and_turned(kind: str, sides: tuple[str, str], angle: float) -> Slid
 
 def slid_over(kind: str, cells: int, geometry: str = "best") -> tuple[Projection, np.ndarray]:
     """Slide a node along an arched master: closest points, and the true normals of the cylinder."""
-    meeting = sliding(on_arch(kind, master_cells=cells, geometry=geometry)).meetings[0]
+    meeting = on_patches(sliding(on_arch(kind, master_cells=cells, geometry=geometry)))
     scene = on_arch(kind, master_cells=cells)
     points, patches = scene.points[meeting.master_nodes], meeting.patches
-    assert patches is not None
     path = np.linspace(-0.5, 0.5, 1001)
     way = np.zeros((len(path), scene.dim))
     way[:, 0] = path
@@ -164,7 +167,7 @@ def test_a_node_keeps_its_facet_until_it_is_well_beyond_the_edge() -> None:
 def test_a_node_between_two_facets_does_not_change_sides_for_ever() -> None:
     scene = on_arch("quadrilateral")
     contact, x = sliding(scene), scene.points.copy()
-    meeting = contact.meetings[0]
+    meeting = on_patches(contact)
     ridge = meeting.master_nodes[np.argmax(x[meeting.master_nodes, 1])]
     slave = meeting.nodes[2]
     sides: dict[bool, set[int]] = {True: set(), False: set()}
@@ -309,17 +312,18 @@ def test_a_node_is_no_slave_where_it_is_the_master_of_one() -> None:
     # Three slaves of the roof on the left, more of the floor on the right, whose ways count.
     scene = ring("quadrilateral", ("inner", "inner"))
     meeting, flat = sliding(scene).meetings[0], scene.points * [1.2, 0.2]
+    assert isinstance(meeting, OnItself)
     none = np.full(len(meeting.candidates), -1), np.zeros((len(meeting.candidates), 1))
-    both = replace(meeting, roles=None).closest(flat, none, none[0] >= 0, np.inf, MPI.COMM_SELF)
+    before = LastPoints.none(scene.dim), MaterialPoints.none(*flat.shape)
+    moved = Moved(scene, flat, 0.0, *before, frozenset(), np.inf, MPI.COMM_SELF)
+    both = OnOwnBody.closest(meeting, moved, none, none[0] >= 0)
     x, y = scene.points[meeting.nodes[both.point]].T
     left = (y > 0.0) & (x < -0.3) & (x > -0.6)
     right = (y < 0.0) & (x > 0.2)
     assert 1 < np.count_nonzero(left) < np.count_nonzero(right)
     last = none[0].copy()
     last[both.point[left | right]] = both.facet[left | right]
-    roles = meeting.roles
-    assert roles is not None
-    slaves = roles.are_slaves(both, last)
+    slaves = meeting.roles.are_slaves(both, last)
     below = (y < 0.0) & (x < -0.3) & (x > -0.6)
     assert slaves[left | right].all()
     assert np.count_nonzero(below) > 1
@@ -526,7 +530,7 @@ def test_what_sticks_to_a_stretched_master_does_not_slip() -> None:
     scene = on_arch("tetrahedron")
     contact, x = sliding(scene), scene.points.copy()
     now = contact.at(x)
-    start, low = now.material_points(), contact.meetings[0].master_nodes
+    start, low = now.material_points(), on_patches(contact).master_nodes
     x[low, 0] *= 1.2
     feet = now.points.master @ x
     x[now.points.slave] = feet + 0.01 * now.points.normal

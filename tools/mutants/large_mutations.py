@@ -71,7 +71,7 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "surfaces that slide have no curvature",
-        "_pairing/sliding/contact.py",
+        "_pairing/sliding/surfaces.py",
         'bend = np.einsum("nabd,nd->nab", at.second, at.normal)',
         'bend = 0.0 * np.einsum("nabd,nd->nab", at.second, at.normal)',
         ("tests/pairing/test_sliding_derivatives.py::test_stiffness_is_the_derivative_of_the_normal_forces",),

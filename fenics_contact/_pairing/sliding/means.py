@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,12 +22,14 @@ from fenics_contact._pairing.mortar.derivatives import (
 from fenics_contact._pairing.mortar.normals import MasterNormals
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._pairing.sliding.closest import moved_surface, summed_normals, summed_normals_by_points
-from fenics_contact._pairing.sliding.meeting import Meeting
 from fenics_contact._pairing.sliding.stiffness import LowRank, frame_changes, spread
 from fenics_contact._scene.parts import slave_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact.mesh.faces import coordinate_rounding
+
+#: A surface in the reference configuration, and its nodes among those of all bodies.
+Side: TypeAlias = tuple[FacetedSurface, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -192,18 +195,17 @@ class MovingMeans:
     comm: MPI.Comm
 
     @classmethod
-    def of(cls, meeting: Meeting, coordinates: np.ndarray, comm: MPI.Comm) -> MovingMeans:
-        """Couple the surfaces of a pair. Collective on ``comm``.
+    def of(
+        cls, slave: Side, master: Side, candidates: np.ndarray, coordinates: np.ndarray, comm: MPI.Comm
+    ) -> MovingMeans:
+        """Couple surfaces where the nodes of all bodies are. Collective on ``comm``.
 
-        `coordinates`: of all nodes, shape (n_nodes, dim), [length]; `comm`: communicator of the ranks that
-        share the work.
+        `candidates`: positions of the slave's nodes that may carry a multiplier.
         """
-        assert meeting.facets is not None
-        slave = moved_surface(meeting.slave, coordinates[meeting.slave_nodes])
-        master = moved_surface(meeting.facets, coordinates[meeting.master_nodes])
-        coupling = mortar_coupling(slave, master, comm)
-        coupling = coupling.part(np.isin(coupling.node, meeting.candidates))
-        return cls(slave, master, coupling, meeting.slave_nodes, meeting.master_nodes, comm)
+        here, there = (moved_surface(surface, coordinates[nodes]) for surface, nodes in (slave, master))
+        coupling = mortar_coupling(here, there, comm)
+        coupling = coupling.part(np.isin(coupling.node, candidates))
+        return cls(here, there, coupling, slave[1], master[1], comm)
 
     def weights(self, n_nodes: int) -> sp.csr_matrix:
         """Return the weights of the nodes of all bodies, shape (n, n_nodes)."""

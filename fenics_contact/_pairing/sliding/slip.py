@@ -39,6 +39,17 @@ class LastPoints:
         """Return those of arrays of `SlidingPoints.stored`."""
         return cls(*(stored[f"found.{name}"] for name in LAST))
 
+    @classmethod
+    def none(cls, dim: int) -> LastPoints:
+        """Return none in a space of a dimension."""
+        nothing = np.zeros(0, dtype=np.int64)
+        return cls(nothing, nothing, nothing, np.zeros((0, dim - 1)), np.zeros((0, dim)))
+
+    @property
+    def points(self) -> LastPoints:
+        """These, as of `SlidingPoints`."""
+        return self
+
 
 #: Names of what points are found again by.
 LAST = tuple(part.name for part in fields(LastPoints))
@@ -59,6 +70,12 @@ class MaterialPoints:
     pair: np.ndarray
     weights: sp.csr_matrix
     place: np.ndarray
+
+    @classmethod
+    def none(cls, n_nodes: int, dim: int) -> MaterialPoints:
+        """Return none, with the number of nodes of all bodies."""
+        nothing = np.zeros(0, dtype=np.int64)
+        return cls(nothing, nothing, sp.csr_matrix((0, n_nodes)), np.zeros((0, dim)))
 
     def extended(self, other: MaterialPoints) -> MaterialPoints:
         """Return these points and those of another set that are not among them.
