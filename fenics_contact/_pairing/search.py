@@ -460,9 +460,9 @@ def _measured(
         if isinstance(pair, CyclicSymmetry):
             from fenics_contact._pairing.sectors import check_sides
 
-            master = master.turned(pair, scene.sector_angle(pair))
+            master = master.turned(pair, pair.angle_in(scene))
             with together(comm):
-                check_sides(pair, scene.sector_angle(pair), slave.surface, master.surface)
+                check_sides(pair, pair.angle_in(scene), slave.surface, master.surface)
         assert isinstance(pair.master, Surface)
         advice.surface(scene, pair.master, pair.geometry, master.surface, comm)
         if isinstance(pair, Tie) and not pair.sliding and not axes:
@@ -479,7 +479,7 @@ def _measured(
                 held = ~movable | np.isin(slave.nodes, points.slave)
                 advice.edge_of_tie(pair, slave.surface, held, master.surface, comm)
         if isinstance(pair, CyclicSymmetry):
-            turn = np.tile(pair.matrix(scene.sector_angle(pair)), (points.count, 1, 1))
+            turn = np.tile(pair.matrix(pair.angle_in(scene)), (points.count, 1, 1))
             points = replace(points, turns=turn)
         else:
             points = with_symmetry(points, _symmetric(points, slave, master), slave.surface.planes)

@@ -131,7 +131,7 @@ def _face(slave: FacetedSurface, master: FacetedSurface) -> bool:
 
 def _sides_match(scene: SceneParts, sector: CyclicSymmetry, slave: BodyMesh, master: BodyMesh) -> bool:
     """Return whether the meshes of both sides of a sector do."""
-    turned = sector.turned(master.points, scene.sector_angle(sector))
+    turned = sector.turned(master.points, sector.angle_in(scene))
     facets = slave.linear.surfaces[sector.slave.name], master.linear.surfaces[sector.master.name]
     return surfaces_match(faceted_surface(slave.points, facets[0]), faceted_surface(turned, facets[1]))
 

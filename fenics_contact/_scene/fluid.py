@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.fields import OfPosition
+from fenics_contact._scene.part import Around, require_surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 
@@ -56,6 +57,16 @@ class FluidPressure:
                     f"FluidPressure.{name} must be zero or positive and finite, got {given!r}: suction does "
                     "not enter a contact"
                 )
+
+    def check(self, scene: Around, body: str, place: str) -> None:
+        """Reject an unknown inlet, and bodies of nonlinear materials; `body`: that of the slave."""
+        if isinstance(self.enters, str):
+            require_surface(scene, body, self.enters, "FluidPressure.enters")
+        if scene.is_nonlinear:
+            raise InvalidInputError(
+                f"the fluid between {place} needs linear materials in all bodies: load the wetted "
+                "surfaces by Pressure where materials are nonlinear"
+            )
 
     @property
     def opens_at(self) -> float:

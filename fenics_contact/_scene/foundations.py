@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats
+from fenics_contact._scene.part import Around, Part, require_surface
 from fenics_contact.errors import InvalidInputError
 
 
 @dataclass(frozen=True)
 @checked()
-class ElasticFoundation:
+class ElasticFoundation(Part):
     """A surface on springs to the ground, which pull and press: the traction −k u on it.
 
     It is part of the stiffness, and of the strain energy, of its body. Bodies may be held by it alone.
@@ -49,8 +50,10 @@ class ElasticFoundation:
             )
         object.__setattr__(self, "stiffness", floats(numbers) if numbers.ndim else float(numbers))
 
-    def require_space(self, dim: int) -> None:
+    def check(self, scene: Around) -> None:
         """Reject a vector in another space than that of the body."""
+        require_surface(scene, self.body, self.surface, "ElasticFoundation")
+        dim = scene.kinematics.components
         if isinstance(self.stiffness, tuple) and len(self.stiffness) != dim:
             raise InvalidInputError(
                 f"ElasticFoundation.stiffness of surface {self.surface!r} of body {self.body!r} must have "

@@ -9,13 +9,14 @@ therefore always return the same values for the same points.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector, check_row, checked, floats, naming_arguments, unit_vector
 from fenics_contact._kinematics.base import Kinematics
+from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import (
     ScalarValue,
     Ufl,
@@ -24,13 +25,16 @@ from fenics_contact._scene.fields import (
     checked_vector,
     evaluate,
 )
+from fenics_contact._scene.part import Around, Part, body_of, require_nodes, require_surface, require_vector
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.elastic import Transverse, can_expand
+from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
 
 
 @dataclass(frozen=True)
 @checked("value")
-class Traction:
+class Traction(Part):
     """Dead surface load.
 
     Attributes:
@@ -52,10 +56,17 @@ class Traction:
         """Reject a value that is not a vector."""
         object.__setattr__(self, "value", checked_vector("Traction.value", self.value))
 
+    def check(self, scene: Around) -> None:
+        """Reject a vector of another space, and a surface without an area."""
+        require_surface(scene, self.body, self.surface, "Traction")
+        of = scene.bodies[self.body].kinematics
+        require_vector(self.value, of.components, of.vector_in_words, "Traction", self.body)
+        _require_area(scene, self.body, self.surface)
+
 
 @dataclass(frozen=True)
 @checked("value")
-class TotalForce:
+class TotalForce(Part):
     """Dead surface load given by its resultant, spread over the surface of the undeformed body.
 
     Without ``moment`` and ``at`` it is an even traction. With them the traction is a + b × (x − c), c being
@@ -96,6 +107,40 @@ class TotalForce:
             )
         object.__setattr__(self, "value", value)
 
+    def check(self, scene: Around) -> None:
+        """Reject a resultant, a moment or a point that its body cannot have."""
+        require_surface(scene, self.body, self.surface, "TotalForce")
+        of, where = scene.bodies[self.body].kinematics, f"surface {self.surface!r} of body {self.body!r}"
+        require_vector(self.value, of.resultant_components, of.resultant_in_words, "TotalForce", self.body)
+        _require_area(scene, self.body, self.surface)
+        if not of.has_moment(self.moment, self.at):
+            raise InvalidInputError(
+                f"TotalForce on {where} of a body of revolution acts along its axis, and outwards all "
+                f"around, got moment {self.moment!r} and at {self.at!r}: leave both out"
+            )
+        dim = scene.bodies[self.body].mesh.dim
+        if self.moment is not None and np.shape(self.moment) != (() if dim == 2 else (3,)):
+            needed = "one number, as the body is plane" if dim == 2 else "three numbers, about x, y and z"
+            raise InvalidInputError(
+                f"TotalForce.moment on {where} must be {needed}, got {self.moment!r}: in the plane "
+                "a moment is positive from x to y"
+            )
+        if self.at is not None and len(self.at) != dim:
+            raise InvalidInputError(
+                f"TotalForce.at of the force on {where} must have {dim} coordinates, got {self.at!r}: give a "
+                "point, or none for the centroid of the surface"
+            )
+
+
+def _require_area(scene: Around, name: str, surface: str) -> None:
+    """Reject a surface on the axis of revolution."""
+    body = scene.bodies[name]
+    if body.on_axis[body.mesh.surfaces[surface]].all():
+        raise InvalidInputError(
+            f"a load on a surface needs an area, surface {surface!r} of body {name!r} is a line, the axis of "
+            "revolution: choose another surface"
+        )
+
 
 def _numbers(name: str, given: GivenVector | float) -> GivenVector | float:
     """Return finite numbers as plain ones."""
@@ -107,7 +152,7 @@ def _numbers(name: str, given: GivenVector | float) -> GivenVector | float:
 
 @dataclass(frozen=True)
 @checked("value")
-class Pressure:
+class Pressure(Part):
     """Load normal to a surface; positive presses on the body, traction = −p n.
 
     On a body of a material for large deformations it follows the surface, f = −p cof F N per undeformed area:
@@ -134,10 +179,15 @@ class Pressure:
         """Reject a value that is not a scalar."""
         object.__setattr__(self, "value", checked_scalar("Pressure.value", self.value))
 
+    def check(self, scene: Around) -> None:
+        """Reject a surface without an area."""
+        require_surface(scene, self.body, self.surface, "Pressure")
+        _require_area(scene, self.body, self.surface)
+
 
 @dataclass(frozen=True)
 @checked("value")
-class BodyForce:
+class BodyForce(Part):
     """Dead load on the volume; for weight see `gravity`.
 
     Attributes:
@@ -154,10 +204,25 @@ class BodyForce:
         """Reject a value that is not a vector."""
         object.__setattr__(self, "value", checked_vector("BodyForce.value", self.value))
 
+    def check(self, scene: Around) -> None:
+        """Reject a vector of another space, an unknown region and an axis that the body does not have."""
+        of = body_of(scene, self.body, "BodyForce").kinematics
+        require_vector(self.value, of.components, of.vector_in_words, "BodyForce", self.body)
+        require_region(self, scene.bodies[self.body].mesh)
+        if isinstance(self.value, Spinning):
+            self.value.require_axis(scene.kinematics)
+
+    def in_scene(self, scene: Around) -> BodyForce:
+        """Return the load with as many components as its body has; what spins has nothing around the axis."""
+        of = scene.kinematics
+        if of.components > of.dim and isinstance(self.value, Spinning):
+            return replace(self, value=replace(self.value, components=of.components))
+        return self
+
 
 @dataclass(frozen=True)
 @checked("temperature_change")
-class ThermalStrain:
+class ThermalStrain(Part):
     """A temperature change that would strain the body if it were free: σ = C : (ε(u) − ΔT α).
 
     Its work is ∫ ΔT (C : α) : ε(v). Several on one body add up. The energy of a state counts it as the work
@@ -179,6 +244,16 @@ class ThermalStrain:
         value = checked_scalar("ThermalStrain.temperature_change", self.temperature_change)
         object.__setattr__(self, "temperature_change", value)
 
+    def check(self, scene: Around) -> None:
+        """Reject materials that do not expand."""
+        materials = body_of(scene, self.body, "ThermalStrain").materials
+        stiff = [material for material in materials if not can_expand(material)]
+        if stiff:
+            raise InvalidInputError(
+                f"ThermalStrain needs a thermal expansion of every material of body {self.body!r}, got none "
+                f"for {stiff[0]!r}: give the material its thermal_expansion"
+            )
+
     @property
     def value(self) -> ScalarValue:
         """ΔT, under the name that all loads have."""
@@ -187,7 +262,7 @@ class ThermalStrain:
 
 @dataclass(frozen=True)
 @checked("value")
-class InitialStress:
+class InitialStress(Part):
     """A stress that a body has before anything loads or moves it: of welding, rolling, an earlier process.
 
     The body relaxes it as far as its supports let it: σ = σ₀ + C : ε(u), and the work of σ₀ is
@@ -223,6 +298,32 @@ class InitialStress:
             check_row(value, "InitialStress.value", 6)
             object.__setattr__(self, "value", floats(np.asarray(value, dtype=np.float64)))
 
+    def check(self, scene: Around) -> None:
+        """Reject nonlinear materials, an unknown region and numbers for components that are zero."""
+        body = body_of(scene, self.body, "InitialStress")
+        require_region(self, body.mesh)
+        stiff = [type(each).__name__ for each in body.materials if is_nonlinear(each)]
+        if stiff:
+            raise InvalidInputError(
+                f"InitialStress needs linear materials, body {self.body!r} has {stiff[0]}: take "
+                "IsotropicElasticity or another one of small strains without a history"
+            )
+        if not callable(self.value):
+            self.require_components(np.array([self.value]), body)
+
+    def require_components(self, stress: np.ndarray, body: Body) -> None:
+        """Reject components that are not zero but have no place in a body; `stress`: (n, 6)."""
+        places = {"zz": 2, "yz": 3, "xz": 4}
+        across = all(isinstance(each, Transverse) for each in body.materials)
+        without = [word for word in body.kinematics.zero_stress if not (across and word == "zz")]
+        given = [word for word in without if stress[:, places[word]].any()]
+        if given:
+            raise InvalidInputError(
+                f"the InitialStress of body {self.body!r} must be zero in {' and '.join(without)}, which it "
+                f"does not have, got others in {' and '.join(given)}: leave them zero; the order is xx, yy, "
+                "zz, yz, xz, xy"
+            )
+
     def on_cells(self, mesh: BodyMesh) -> np.ndarray:
         """Return the stress of all cells of a mesh, (n_cells, 6).
 
@@ -242,7 +343,7 @@ class InitialStress:
 
 @dataclass(frozen=True)
 @checked("value")
-class PointForce:
+class PointForce(Part):
     """Dead forces at single nodes.
 
     Under a force at a point an elastic body has no finite displacement or stress: both grow as its mesh is
@@ -273,6 +374,12 @@ class PointForce:
             )
         object.__setattr__(self, "value", value)
 
+    def check(self, scene: Around) -> None:
+        """Reject nodes that are not there, and a vector of another space."""
+        require_nodes(scene, self.body, self.nodes, "PointForce")
+        of = scene.bodies[self.body].kinematics
+        require_vector(self.value, of.components, of.vector_in_words, "PointForce", self.body)
+
     def at(self, points: np.ndarray, components: int) -> np.ndarray:
         """Return the forces on nodes at points, (n, dim) to (n, components).
 
@@ -300,6 +407,16 @@ def require_region(load: BodyForce | InitialStress, mesh: BodyMesh) -> None:
             f"{type(load).__name__} names region {load.region!r} of body {load.body!r}, whose mesh has "
             f"{sorted(mesh.regions)}: use one of them, or none for the whole body"
         )
+
+
+def initial_stress(loads: Iterable[InitialStress], body: Body) -> np.ndarray:
+    """Return the sum of initial stresses on the cells of a body, (n_cells, 6), xx, yy, zz, yz, xz, xy."""
+    total = np.zeros((body.mesh.n_cells, 6))
+    for load in loads:
+        found = load.on_cells(body.mesh)
+        load.require_components(found, body)
+        total += found
+    return total
 
 
 def gravity(body: str, density: float, acceleration: Sequence[float], region: str | None = None) -> BodyForce:

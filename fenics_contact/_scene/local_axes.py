@@ -11,6 +11,8 @@ import scipy.sparse as sp
 from fenics_contact._base.display import counted
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import vector_areas
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,3 +239,34 @@ def _straighten(axes: np.ndarray, values: np.ndarray, straight: float = 1e-9) ->
     moved = np.einsum("nad,na->nd", axes[whole], np.nan_to_num(values[whole]))
     values[whole] = np.where(share[whole] > 0.5, moved, np.nan)
     axes[whole] = own
+
+
+def flat_normal(mesh: BodyMesh, surface: str, flat: float = 1e-6) -> np.ndarray | None:
+    """Return the outward normal of a flat surface, shape (dim,), None of a curved one and of a node set.
+
+    `flat`: distance of nodes from a plane, relative to the size of the surface, up to which it is flat:
+    coordinates of files have few digits.
+    """
+    if surface in mesh.node_sets:
+        return None
+    facets = mesh.surfaces[surface]
+    areas = vector_areas(mesh.points, facets)
+    total = areas.sum(axis=0)
+    size = np.linalg.norm(areas, axis=1).sum()
+    if np.linalg.norm(total) <= 0.5 * size:
+        return None
+    normal = total / np.linalg.norm(total)
+    points = mesh.points[np.unique(facets)]
+    away = (points - points[0]) @ normal
+    if np.ptp(away) > flat * np.linalg.norm(np.ptp(points, axis=0)) or (areas @ normal <= 0.0).any():
+        return None
+    return np.asarray(normal)
+
+
+def widest_angle(mesh: BodyMesh, surface: str) -> float:
+    """Return the largest angle between the normals of facets and their mean, in degrees."""
+    areas = vector_areas(mesh.points, mesh.surfaces[surface])
+    mean = areas.sum(axis=0)
+    size = np.linalg.norm(areas, axis=1) * np.linalg.norm(mean)
+    cosine = np.where(size > 0.0, areas @ mean, -1.0) / np.where(size > 0.0, size, 1.0)
+    return float(np.degrees(np.arccos(np.clip(cosine.min(), -1.0, 1.0))))

@@ -25,7 +25,6 @@ from fenics_contact._scene.loads import (
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import surface_of
-from fenics_contact._scene.rollers import direction_of
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import RigidSurface, Roller, ToolMotion
 from fenics_contact._scene.tools import ToolBody
@@ -55,7 +54,7 @@ def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
     sizes = [0.0]
     for support in scene.supports:
         if isinstance(support, Roller):
-            along = direction_of(scene.bodies[support.body].mesh, support)
+            along = support.direction_on(scene.bodies[support.body].mesh)
             if along is not None and not callable(support.displacement):
                 sizes.append(abs(support.displacement * float(along @ normal)))
             continue

@@ -14,6 +14,7 @@ from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
+from fenics_contact._scene.part import Around, Part, require_surface
 from fenics_contact._scene.surface_laws import (
     ClosureLaw,
     FrictionCurve,
@@ -23,6 +24,7 @@ from fenics_contact._scene.surface_laws import (
 )
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.hyperelastic import is_nonlinear
 
 #: Where contact is enforced: at the slave's nodes, or weighted by its shape functions (mortar).
 Discretisation: TypeAlias = Literal["node", "mortar"]
@@ -131,7 +133,7 @@ Friction: TypeAlias = Coulomb | Tresca | None
 @in_notebooks
 @dataclass(frozen=True)
 @checked()
-class ContactPair(Chosen):
+class ContactPair(Chosen, Part):
     """Two surfaces that may touch. The slave may not penetrate the master.
 
     Attributes:
@@ -212,6 +214,51 @@ class ContactPair(Chosen):
             raise InvalidInputError(
                 f"contact of the nodes of {self.nodes!r} alone is by nodes and between two bodies, got "
                 f"{given}: leave the nodes out, or give no discretisation and a master of another body"
+            )
+
+    def check(self, scene: Around) -> None:
+        """Reject surfaces that are not there, and what does not suit the bodies."""
+        require_surface(scene, self.slave.body, self.slave.name, "ContactPair.slave")
+        if self.within_body:
+            self._require_deforming(scene)
+        if self.fluid is not None:
+            self.fluid.check(scene, self.slave.body, self.place)
+        if self.nodes is not None:
+            self._require_touching(scene, self.nodes)
+        if self.slip_table is not None and scene.is_nonlinear:
+            raise InvalidInputError(
+                f"the SlipTable of {self.place} needs linear materials in all bodies: give the coefficient "
+                "of each load step as a number or a function of the place"
+            )
+        if isinstance(self.master, Surface):
+            require_surface(scene, self.master.body, self.master.name, "ContactPair.master")
+        else:
+            _require_dimension(scene, self.master)
+
+    def _require_deforming(self, scene: Around) -> None:
+        """Reject contact of a body with itself unless it may deform much."""
+        materials = scene.bodies[self.slave.body].materials
+        deforming = any(is_nonlinear(each) and getattr(each, "finite", True) for each in materials)
+        if self.discretisation == "mortar" or self.given_gap or not deforming:
+            raise InvalidInputError(
+                f"contact of body {self.slave.body!r} with itself needs a material for large deformations, "
+                "discretisation='node' and gaps as they are: change the material, such as to NeoHooke, or "
+                "split the body where its parts may touch"
+            )
+
+    def _require_touching(self, scene: Around, nodes: str) -> None:
+        """Reject nodes that may touch without a node set of the slave's mesh, or off the slave surface."""
+        mesh = scene.bodies[self.slave.body].mesh
+        if nodes not in mesh.node_sets:
+            raise InvalidInputError(
+                f"ContactPair.nodes names node set {nodes!r} of body {self.slave.body!r}, which has "
+                f"{sorted(mesh.node_sets)}: use one of them"
+            )
+        away = ~np.isin(mesh.node_sets[nodes], mesh.surfaces[self.slave.name])
+        if away.any():
+            raise InvalidInputError(
+                f"nodes of {self.place} that may touch must lie on its slave surface, {int(away.sum())} of "
+                f"{len(away)} of {nodes!r} do not: name a slave surface that has them all"
             )
 
     @property
@@ -340,7 +387,7 @@ class ContactPair(Chosen):
 @in_notebooks
 @dataclass(frozen=True)
 @checked()
-class Tie(Chosen):
+class Tie(Chosen, Part):
     """Two surfaces that stay together: they neither separate nor, unless ``sliding``, shift.
 
     An initial gap between their meshes stays as it is.
@@ -367,6 +414,11 @@ class Tie(Chosen):
                 f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "
                 "together, or as two bodies"
             )
+
+    def check(self, scene: Around) -> None:
+        """Reject surfaces that are not there."""
+        require_surface(scene, self.slave.body, self.slave.name, "Tie.slave")
+        require_surface(scene, self.master.body, self.master.name, "Tie.master")
 
     @property
     def geometry(self) -> Geometry:
@@ -397,6 +449,18 @@ class Pairs(tuple[ContactPair, ...]):
             for number, pair in enumerate(self)
         ]  # fmt: skip
         return [Table([head, *rows], 4)] if rows else []
+
+
+def _require_dimension(scene: Around, obstacle: RigidObstacle) -> None:
+    """Reject an obstacle whose dimension, if it has one, is not that of the bodies."""
+    needed = scene.kinematics.dim
+    dim = getattr(obstacle, "dim", needed)
+    if dim != needed:
+        raise InvalidInputError(
+            f"an obstacle must lie in the space of the bodies, {type(obstacle).__name__} is for {dim} "
+            f"dimensions and the bodies have {needed}: give it {needed} coordinates, or in the plane "
+            "a RigidSphere for a round bar"
+        )
 
 
 def _check_stiffness(name: str, given: float | None) -> None:

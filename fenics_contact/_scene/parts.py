@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
@@ -14,44 +14,35 @@ from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.constraints import LinearConstraint
 from fenics_contact._scene.foundations import ElasticFoundation
-from fenics_contact._scene.initial_stress import require_components
-from fenics_contact._scene.loads import (
-    BodyForce,
-    InitialStress,
-    Load,
-    Pressure,
-    Spinning,
-    SurfaceLoad,
-    ThermalStrain,
-    TotalForce,
-    require_region,
+from fenics_contact._scene.loads import Load, Pressure
+from fenics_contact._scene.local_axes import (
+    NO_AXES,
+    HeldDirections,
+    LocalAxes,
+    flat_normal,
+    held_along,
+    same_axes,
 )
-from fenics_contact._scene.local_axes import NO_AXES, HeldDirections, LocalAxes, held_along, same_axes
-from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface, pressures_of
+from fenics_contact._scene.part import Part, body_of
 from fenics_contact._scene.preloads import Preload
-from fenics_contact._scene.revolution import hold_axis, require_all_or_none, require_simple_torsion, twisting
-from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, require_direction
+from fenics_contact._scene.revolution import hold_axis, require_all_or_none, require_simple_torsion
+from fenics_contact._scene.rollers import held_directions
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support, ToolMotion
 from fenics_contact._scene.thickness import require_thickness
 from fenics_contact._scene.tools import ToolBody, bodies_with_tools, with_motions
-from fenics_contact._scene.touching import check_touching
 from fenics_contact._surfaces.corners import facing_area, sharp_nodes
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.true_surface import Geometry, true_surface
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.materials.elastic import Material, can_expand
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import vector_areas
 
 if TYPE_CHECKING:
     from fenics_contact._surfaces.continued import Neighbour
-
-_ON_NODES = ("Support", "Roller", "RigidSurface", "PointForce", "Spring.first", "Spring.second")
-"""What may act on the nodes of a node set."""
 
 
 @dataclass(frozen=True)
@@ -79,53 +70,10 @@ class SceneParts:
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "supports", supports)
         self._require_one_dimension()
-        for part in (*self.supports, *self.loads):
-            surface = part.surface if isinstance(part, SurfaceLoad | AnySupport) else None
-            self._require(part.body, getattr(part, "nodes", surface), type(part).__name__)
-        for preload in self.preloads:
-            self._require(preload.body, None, "Preload")
-        for foundation in self.foundations:
-            self._require(foundation.body, foundation.surface, "ElasticFoundation")
-            foundation.require_space(self.components)
-        for spring in self.springs:
-            for name, end in spring.surfaces.items():
-                self._require(end.body, end.name, f"Spring.{name}")
-            spring.require_suits(self)
-        object.__setattr__(self, "supports", tuple(map(self._in_space, self.supports)))
-        if self.torsion:
-            object.__setattr__(self, "loads", tuple(map(twisting, self.loads)))
-        for part in (*self.supports, *self.loads):
-            if not isinstance(part, RigidSurface | Roller | ToolMotion):
-                self._require_components(part)
-            self._require_off_axis(part)
-            if isinstance(part, TotalForce):
-                self._require_lever(part)
-            if isinstance(part, BodyForce | InitialStress):
-                require_region(part, self.bodies[part.body].mesh)
-            if isinstance(part, BodyForce) and isinstance(part.value, Spinning):
-                part.value.require_axis(self.kinematics)
-            if isinstance(part, InitialStress):
-                require_components(part, self.bodies[part.body])
-            if isinstance(part, ThermalStrain):
-                self._require_expansion(part)
-        pairs: list[ContactPair | AnyTie] = [*self.contacts, *self.ties]
-        for pair in pairs:
-            kind = type(pair).__name__
-            self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
-            if isinstance(pair, ContactPair) and pair.within_body:
-                self._require_deforming(pair)
-            if isinstance(pair, ContactPair) and pair.fluid is not None:
-                self._require_inlet(pair)
-            if isinstance(pair, ContactPair) and pair.nodes is not None:
-                check_touching(self.bodies[pair.slave.body].mesh, pair)
-            if isinstance(pair, ContactPair) and pair.slip_table is not None:
-                self._require_linear_slip(pair)
-            if isinstance(pair.master, Surface):
-                self._require(pair.master.body, pair.master.name, f"{kind}.master")
-                if isinstance(pair, CyclicSymmetry):
-                    self._require_sector(pair)
-            else:
-                self._require_dimension(pair.master)
+        for part in self._parts:
+            part.check(self)
+        for name in ("supports", "loads"):
+            object.__setattr__(self, name, tuple(part.in_scene(self) for part in getattr(self, name)))
         require_thickness(self.deforming, self.foundations, (*self.contacts, *self.ties))
         _require_different(self.contacts)
         _require_different(self.ties)
@@ -140,9 +88,20 @@ class SceneParts:
             require_simple_torsion(self.bodies.values(), self.supports, others)
 
     @property
+    def _parts(self) -> Iterator[Part]:
+        """All parts that act on bodies or join them."""
+        yield from (*self.supports, *self.loads, *self.preloads, *self.foundations, *self.springs)
+        yield from (*self.contacts, *self.ties)
+
+    @property
     def deforms_much(self) -> bool:
         """Whether one of its bodies does."""
         return any(body.deforms_much for body in self.bodies.values())
+
+    @property
+    def is_nonlinear(self) -> bool:
+        """Whether some material's stress is no linear function of the displacement."""
+        return any(is_nonlinear(each) for body in self.bodies.values() for each in body.materials)
 
     @property
     def deforming(self) -> dict[str, Body]:
@@ -168,149 +127,6 @@ class SceneParts:
                 f"the bodies of a scene must all be plane or all be solid, got plane {plane} and solid "
                 f"{solid}: give the plane ones a thickness, as block(...) or an extruded mesh, or describe "
                 "two scenes"
-            )
-
-    def _require(self, body: str, surface: str | None, user: str) -> None:
-        if body not in self.bodies:
-            raise InvalidInputError(
-                f"{user} names body {body!r}, the scene has {sorted(self.bodies)}: use one of them"
-            )
-        if surface is None:
-            return
-        surfaces = self.bodies[body].mesh.surfaces
-        nodes = self.bodies[body].mesh.node_sets if user in _ON_NODES else ()
-        if surface not in surfaces and surface not in nodes:
-            raise InvalidInputError(
-                f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: "
-                "use one of them"
-            )
-
-    def _in_space(self, support: AnySupport) -> AnySupport:
-        """Return a support with as many components as its body has; reject a point in another space."""
-        dim = self.bodies[support.body].mesh.dim
-        if isinstance(support, Support):
-            return support.held_in(self.components)
-        if isinstance(support, Roller):
-            require_direction(self.bodies[support.body], support)
-            return support
-        assert isinstance(support, RigidSurface)
-        if self.axisymmetric:
-            support = support.along_axis(self.torsion)
-        if support.dim != dim:
-            raise InvalidInputError(
-                f"RigidSurface.at on surface {support.surface!r} of body {support.body!r} must have {dim} "
-                f"coordinates, got {support.at!r}: give {dim} of them, and as many displacements"
-            )
-        return support
-
-    def _require_components(self, part: Load | Support) -> None:
-        """Reject a vector whose dimension is not that of its body."""
-        if isinstance(part, InitialStress):
-            return
-        of = self.bodies[part.body].kinematics
-        dim, needed = of.components, of.vector_in_words
-        if isinstance(part, TotalForce):
-            dim, needed = of.resultant_components, of.resultant_in_words
-        if isinstance(part.value, tuple) and len(part.value) != dim:
-            raise InvalidInputError(
-                f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
-                f"give {dim} of them"
-            )
-
-    def _require_off_axis(self, part: Load | AnySupport) -> None:
-        """Reject a surface load on the axis, and a resultant with a moment."""
-        if not isinstance(part, SurfaceLoad):
-            return
-        where, body = f"surface {part.surface!r} of body {part.body!r}", self.bodies[part.body]
-        if body.on_axis[body.mesh.surfaces[part.surface]].all():
-            raise InvalidInputError(
-                f"a load on a surface needs an area, {where} is a line, the axis of revolution: choose "
-                "another surface"
-            )
-        if isinstance(part, TotalForce) and not body.kinematics.has_moment(part.moment, part.at):
-            raise InvalidInputError(
-                f"TotalForce on {where} of a body of revolution acts along its axis, and outwards all "
-                f"around, got moment {part.moment!r} and at {part.at!r}: leave both out"
-            )
-
-    def _require_lever(self, load: TotalForce) -> None:
-        """Reject a moment or a point whose dimension is not that of the body."""
-        dim = self.bodies[load.body].mesh.dim
-        where = f"surface {load.surface!r} of body {load.body!r}"
-        if load.moment is not None and np.shape(load.moment) != (() if dim == 2 else (3,)):
-            needed = "one number, as the body is plane" if dim == 2 else "three numbers, about x, y and z"
-            raise InvalidInputError(
-                f"TotalForce.moment on {where} must be {needed}, got {load.moment!r}: in the plane "
-                "a moment is positive from x to y"
-            )
-        if load.at is not None and len(load.at) != dim:
-            raise InvalidInputError(
-                f"TotalForce.at of the force on {where} must have {dim} coordinates, got {load.at!r}: give a "
-                "point, or none for the centroid of the surface"
-            )
-
-    def _require_dimension(self, obstacle: RigidObstacle) -> None:
-        """Reject an obstacle whose dimension, if it has one, is not that of the bodies."""
-        dim = getattr(obstacle, "dim", self.dim)
-        if dim != self.dim:
-            raise InvalidInputError(
-                f"an obstacle must lie in the space of the bodies, {type(obstacle).__name__} is for {dim} "
-                f"dimensions and the bodies have {self.dim}: give it {self.dim} coordinates, or in the plane "
-                "a RigidSphere for a round bar"
-            )
-
-    def _require_linear_slip(self, pair: ContactPair) -> None:
-        """Reject friction by slip between nonlinear materials."""
-        if any(is_nonlinear(m) for body in self.bodies.values() for m in body.materials):
-            raise InvalidInputError(
-                f"the SlipTable of {pair.place} needs linear materials in all bodies: give the coefficient "
-                "of each load step as a number or a function of the place"
-            )
-
-    def _require_inlet(self, pair: ContactPair) -> None:
-        """Reject fluid that enters at an unknown surface, and between bodies with nonlinear materials."""
-        enters = pair.fluid.enters if pair.fluid is not None else ""
-        if isinstance(enters, str):
-            self._require(pair.slave.body, enters, "FluidPressure.enters")
-        if any(is_nonlinear(m) for body in self.bodies.values() for m in body.materials):
-            raise InvalidInputError(
-                f"the fluid between {pair.place} needs linear materials in all bodies: load the wetted "
-                "surfaces by Pressure where materials are nonlinear"
-            )
-
-    def _require_deforming(self, pair: ContactPair) -> None:
-        """Reject contact of a body with itself unless it may deform much."""
-        deforming = (is_nonlinear(m) and getattr(m, "finite", True) for m in self._materials(pair.slave))
-        if pair.discretisation == "mortar" or pair.given_gap or not any(deforming):
-            raise InvalidInputError(
-                f"contact of body {pair.slave.body!r} with itself needs a material for large deformations, "
-                "discretisation='node' and gaps as they are: change the material, such as to NeoHooke, or "
-                "split the body where its parts may touch"
-            )
-
-    def _materials(self, surface: Surface) -> tuple[Material, ...]:
-        return self.bodies[surface.body].materials
-
-    def _require_sector(self, sector: CyclicSymmetry) -> None:
-        """Reject an axis in another space, and sides that are no part of a turn apart."""
-        if len(sector.at) != self.dim or not self.kinematics.can_rotate:
-            raise InvalidInputError(
-                f"CyclicSymmetry.at of {sector.place} must have {self.dim} coordinates, and bodies of "
-                f"revolution have no sectors, got {sector.at!r}: give a point of the bodies' space"
-            )
-        self.sector_angle(sector)
-
-    def sector_angle(self, sector: CyclicSymmetry) -> float:
-        """Return the angle that turns the master of a sector onto its slave, in radians."""
-        slave, master = (self.bodies[s.body].mesh.origin for s in (sector.slave, sector.master))
-        return sector.measured_angle(slave, master)
-
-    def _require_expansion(self, load: ThermalStrain) -> None:
-        stiff = [material for material in self.bodies[load.body].materials if not can_expand(material)]
-        if stiff:
-            raise InvalidInputError(
-                f"ThermalStrain needs a thermal expansion of every material of body {load.body!r}, got none "
-                f"for {stiff[0]!r}: give the material its thermal_expansion"
             )
 
     @property
@@ -477,7 +293,7 @@ class SceneParts:
             InvalidInputError: If a body is unknown, a coordinate is not finite or a cell is inverted.
         """
         for name in points:
-            self._require(name, None, "moved")
+            body_of(self, name, "moved")
         return self._with_meshes({name: self.bodies[name].mesh.moved(x) for name, x in points.items()})
 
     def reshaped(self, points: Mapping[str, np.ndarray]) -> Self:
@@ -490,7 +306,7 @@ class SceneParts:
             InvalidInputError: As `moved`.
         """
         for name in points:
-            self._require(name, None, "reshaped")
+            body_of(self, name, "reshaped")
         return self._with_meshes({name: self.bodies[name].mesh.reshaped(x) for name, x in points.items()})
 
     @property
@@ -539,7 +355,7 @@ def _plane(scene: SceneParts, support: AnySupport) -> np.ndarray | None:
         return None
     mesh = scene.bodies[support.body].mesh
     normal = flat_normal(mesh, support.surface)
-    if normal is None or abs(direction_of(mesh, support) @ normal) < 1.0 - TILT:
+    if normal is None or abs(support.direction_on(mesh) @ normal) < 1.0 - TILT:
         return None
     return normal if scene.kinematics.is_mirrored(normal, TILT) else None
 
@@ -626,7 +442,7 @@ def _neighbours(scene: SceneParts, body: str) -> tuple[Neighbour, ...]:
     mesh, found = scene.bodies[body].mesh, []
     for sector in scene.sectors:
         if sector.slave.body == body == sector.master.body:
-            angle = scene.sector_angle(sector)
+            angle = sector.angle_in(scene)
             slave, master = (np.unique(mesh.surfaces[s.name]) for s in (sector.slave, sector.master))
             found.append(Neighbour(slave, master, sector.turned(mesh.points, angle)))
             found.append(Neighbour(master, slave, sector.turned(mesh.points, -angle)))

@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._kinematics.measure import PLAIN, Measure
+from fenics_contact._scene.part import Around, Part, body_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, Cut
 from fenics_contact.mesh.faces import vector_areas
@@ -89,7 +90,7 @@ AnySection: TypeAlias = Section | tuple[str, str]
 
 @dataclass(frozen=True)
 @checked()
-class Preload:
+class Preload(Part):
     """A bolt drawn together at a section through its body, by a force or a length, or held at its length.
 
     The sides of the section move alike, but that one approaches the other along the normal n by the
@@ -134,6 +135,10 @@ class Preload:
                 f"Preload.section must be a Section or the names of two regions, got {self.section!r}: give "
                 "the regions on both sides of the face"
             )
+
+    def check(self, scene: Around) -> None:
+        """Reject a body that is not there."""
+        body_of(scene, self.body, "Preload")
 
     @property
     def place(self) -> str:

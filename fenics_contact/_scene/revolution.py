@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.loads import BodyForce, Load, Spinning
 from fenics_contact._scene.supports import AnySupport, Roller
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import is_nonlinear
@@ -49,13 +47,6 @@ def hold_axis(body: Body, name: str, prescribed: np.ndarray) -> None:
                 f"up to {moved:.3g} there: leave it free or zero"
             )
         prescribed[axis, component] = 0.0
-
-
-def twisting(load: Load) -> Load:
-    """Return a load of a body that may twist; a centrifugal one has nothing around the axis."""
-    if isinstance(load, BodyForce) and isinstance(load.value, Spinning):
-        return replace(load, value=replace(load.value, components=3))
-    return load
 
 
 def require_simple_torsion(

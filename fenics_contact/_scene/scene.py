@@ -22,7 +22,6 @@ from fenics_contact._scene.sections import changed_by, require_preloads, with_cu
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
-from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.bisection import default_partition
 
 if TYPE_CHECKING:
@@ -100,11 +99,6 @@ class Scene(SceneParts):
         return {
             name: default_partition(body.mesh, each, body=name, lean=lean) for name, body in bodies.items()
         }
-
-    @property
-    def is_nonlinear(self) -> bool:
-        """Whether some material's stress is no linear function of the displacement."""
-        return any(is_nonlinear(each) for body in self.bodies.values() for each in body.materials)
 
     def _facts(self) -> dict[str, Any]:
         return {

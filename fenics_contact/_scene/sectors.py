@@ -13,6 +13,7 @@ from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
 from fenics_contact._scene.local_axes import HeldDirections
 from fenics_contact._scene.pairs import AnyDiscretisation, Surface, Tie, place_of
+from fenics_contact._scene.part import Around, Part, require_surface
 from fenics_contact._surfaces.facets import surface_moments
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
@@ -22,7 +23,7 @@ from fenics_contact.shapes.simple import tangent_bases
 
 @dataclass(frozen=True)
 @checked()
-class CyclicSymmetry(Chosen):
+class CyclicSymmetry(Chosen, Part):
     """Both sides of a sector that repeats around an axis: u_slave = R u_master, R turns master onto slave.
 
     One of the `Scene.ties`. The sector is 360°/N of a whole whose loads and supports repeat, too; all its
@@ -77,6 +78,23 @@ class CyclicSymmetry(Chosen):
                 f"CyclicSymmetry needs both sides of a sector, got {self.place}: name the other side as "
                 "master"
             )
+
+    def check(self, scene: Around) -> None:
+        """Reject an axis in another space, and sides that are no part of a turn apart."""
+        require_surface(scene, self.slave.body, self.slave.name, "CyclicSymmetry.slave")
+        require_surface(scene, self.master.body, self.master.name, "CyclicSymmetry.master")
+        of = scene.kinematics
+        if len(self.at) != of.dim or not of.can_rotate:
+            raise InvalidInputError(
+                f"CyclicSymmetry.at of {self.place} must have {of.dim} coordinates, and bodies of "
+                f"revolution have no sectors, got {self.at!r}: give a point of the bodies' space"
+            )
+        self.angle_in(scene)
+
+    def angle_in(self, scene: Around) -> float:
+        """Return the angle that turns the master onto the slave, in radians."""
+        slave, master = (scene.bodies[side.body].mesh.origin for side in (self.slave, self.master))
+        return self.measured_angle(slave, master)
 
     @property
     def sliding(self) -> bool:

@@ -2,44 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.part import Around, Part, require_nodes
 from fenics_contact._surfaces.facets import nodal_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.faces import of_one_shape
 
 
-class Around(Protocol):
-    """What a spring needs to know of its scene."""
-
-    @property
-    def bodies(self) -> Mapping[str, Body]:
-        """Bodies by name."""
-
-    @property
-    def dim(self) -> int:
-        """Displacement components of a node."""
-
-    @property
-    def axisymmetric(self) -> bool:
-        """Whether its bodies are bodies of revolution."""
-
-    @property
-    def deforms_much(self) -> bool:
-        """Whether one of its bodies does."""
-
-
 @dataclass(frozen=True)
 @checked()
-class Spring:
+class Spring(Part):
     """A spring between two surfaces, or between a surface and a fixed point.
 
     It acts on the mean displacements ū = ∫ u dA / ∫ dA of its ends, with forces spread over them as an even
@@ -132,15 +110,17 @@ class Spring:
         """Return the directions in which it acts, unit vectors, (n, dim), and its stiffness in each, (n,)."""
         if isinstance(self.stiffness, tuple):
             numbers = np.array(self.stiffness)
-            return np.eye(scene.dim)[numbers > 0.0], numbers[numbers > 0.0]
+            return np.eye(scene.kinematics.dim)[numbers > 0.0], numbers[numbers > 0.0]
         line = np.diff(self.centres(scene), axis=0)
         line /= np.linalg.norm(line)
         line[np.abs(line) <= ROUNDING] = 0.0
         return line, np.array([self.stiffness])
 
-    def require_suits(self, scene: Around) -> None:
+    def check(self, scene: Around) -> None:
         """Reject numbers of another space, springs without a line, and motions that bodies do not have."""
-        dim, revolved = scene.dim, scene.axisymmetric
+        for name, end in self.surfaces.items():
+            require_nodes(scene, end.body, end.name, f"Spring.{name}")
+        dim, revolved = scene.kinematics.dim, not scene.kinematics.can_rotate
         for name in ("stiffness", "second"):
             given, known = getattr(self, name), np.isfinite if name == "second" else np.ones_like
             if isinstance(given, tuple) and (len(given) != dim or not np.all(known(given))):

@@ -11,8 +11,11 @@ from scipy.spatial.transform import Rotation
 from fenics_contact._base.checks import LARGEST, GivenVector, checked, floats, unit_vector
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.fields import OfPosition, evaluate
+from fenics_contact._scene.local_axes import flat_normal, widest_angle
+from fenics_contact._scene.part import Around, Part, require_nodes, require_vector
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.kernels import motions_about
+from fenics_contact.mesh.body_mesh import BodyMesh
 
 #: What a support does with one component: leave it free (None), or prescribe a number or a function of the
 #: points.
@@ -37,7 +40,7 @@ class Kept:
 
 @dataclass(frozen=True)
 @checked()
-class Support:
+class Support(Part):
     """Displacement prescribed on a surface, or at single nodes, component by component.
 
     Attributes:
@@ -73,9 +76,15 @@ class Support:
             )
         object.__setattr__(self, "value", tuple(self.value))
 
-    def held_in(self, dim: int) -> Support:
-        """Return the support of a body of a dimension: zeros for three directions hold a plane body, too."""
-        plane = dim == 2 and self.value == (0.0, 0.0, 0.0)
+    def check(self, scene: Around) -> None:
+        """Reject nodes that are not there, and another number of components."""
+        require_nodes(scene, self.body, self.surface, "Support")
+        of, value = scene.bodies[self.body].kinematics, self.in_scene(scene).value
+        require_vector(value, of.components, of.vector_in_words, "Support", self.body)
+
+    def in_scene(self, scene: Around) -> Support:
+        """Return the support with as many components as bodies have: three zeros hold plane ones, too."""
+        plane = scene.kinematics.components == 2 and self.value == (0.0, 0.0, 0.0)
         return replace(self, value=(0.0, 0.0)) if plane else self
 
     @property
@@ -108,7 +117,7 @@ class Support:
 
 @dataclass(frozen=True)
 @checked()
-class Roller:
+class Roller(Part):
     """A surface that slides: the displacement along its normal, or another direction, alone is prescribed.
 
     On a flat side it is a plane of symmetry, in whatever direction that lies: surfaces of contact that it
@@ -152,6 +161,36 @@ class Roller:
             dim = 2 if len(self.direction) == 2 else 3
             object.__setattr__(self, "direction", unit_vector(name, self.direction, dim))
 
+    def check(self, scene: Around) -> None:
+        """Reject nodes that are not there, and a direction that they do not have."""
+        require_nodes(scene, self.body, self.surface, "Roller")
+        body, given = scene.bodies[self.body], self.direction
+        mesh, where = body.mesh, f"{self.surface!r} of body {self.body!r}"
+        if self.surface in mesh.node_sets and given is None:
+            raise InvalidInputError(
+                f"a roller on nodes needs a direction, node set {where} has no normal: give one"
+            )
+        if given is not None and not callable(given) and len(given) != mesh.dim:
+            raise InvalidInputError(
+                f"Roller.direction of surface {where} must have {mesh.dim} components, got {given!r}: give "
+                f"{mesh.dim} of them, or none for the normal"
+            )
+        if body.deforms_much and self.direction_on(mesh) is None:
+            raise InvalidInputError(
+                f"a roller on a body that deforms much needs one direction, but surface {where} is curved, "
+                f"its normals turn by up to {widest_angle(mesh, self.surface):.3g} degrees: give the roller "
+                "a direction, or hold the surface by a RigidObstacle and contact"
+                if given is None
+                else f"a roller on a body that deforms much needs one direction, that of {where} is a "
+                "function: give a vector"
+            )
+
+    def direction_on(self, mesh: BodyMesh) -> np.ndarray | None:
+        """Return the one direction along which it holds its nodes, shape (dim,); None where they differ."""
+        if callable(self.direction):
+            return None
+        return flat_normal(mesh, self.surface) if self.direction is None else np.array(self.direction)
+
     @property
     def in_words(self) -> str:
         """Where it is and what it prescribes."""
@@ -178,7 +217,7 @@ Motion: TypeAlias = tuple[float | None, ...]
 
 @dataclass(frozen=True)
 @checked()
-class RigidSurface:
+class RigidSurface(Part):
     """A surface that moves as one rigid piece: u = U + θ × (x − p), U and θ being the motion of a point p.
 
     Components of U and θ that are given are prescribed; the others follow from the equilibrium of the surface
@@ -234,6 +273,21 @@ class RigidSurface:
                 f"force {self.force!r} and moment {self.moment!r} beside displacement {self.displacement!r} "
                 f"and rotation {self.rotation!r}: leave the component free (None), or the load away"
             )
+
+    def check(self, scene: Around) -> None:
+        """Reject nodes that are not there, and a point of another space."""
+        require_nodes(scene, self.body, self.surface, "RigidSurface")
+        dim, found = scene.bodies[self.body].mesh.dim, self.in_scene(scene)
+        if found.dim != dim:
+            raise InvalidInputError(
+                f"RigidSurface.at on surface {self.surface!r} of body {self.body!r} must have {dim} "
+                f"coordinates, got {self.at!r}: give {dim} of them, and as many displacements"
+            )
+
+    def in_scene(self, scene: Around) -> RigidSurface:
+        """Return the rigid surface with the motions that its body can have."""
+        of = scene.kinematics
+        return self if of.can_rotate else self.along_axis(of.components > of.dim)
 
     def along_axis(self, torsion: bool = False) -> RigidSurface:
         """Return the rigid surface of a body of revolution, which moves along the axis alone.
@@ -389,7 +443,7 @@ TOOL = "tool"
 
 @dataclass(frozen=True)
 @checked()
-class ToolMotion:
+class ToolMotion(Part):
     """What moves a `RigidTool`: prescribed components, forces, moments and springs, for a support.
 
     Components of displacement and rotation that are given are prescribed; the others follow from equilibrium

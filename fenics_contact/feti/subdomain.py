@@ -21,8 +21,14 @@ from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.foundations import ElasticFoundation
-from fenics_contact._scene.initial_stress import initial_stress
-from fenics_contact._scene.loads import InitialStress, Load, PointForce, SurfaceLoad, ThermalStrain
+from fenics_contact._scene.loads import (
+    InitialStress,
+    Load,
+    PointForce,
+    SurfaceLoad,
+    ThermalStrain,
+    initial_stress,
+)
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes

@@ -29,7 +29,7 @@ from fenics_contact._fem.templates import (
 from fenics_contact._kinematics.element import Element
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.initial_stress import initial_stress
+from fenics_contact._scene.loads import initial_stress
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import filled_at_corners
 from fenics_contact.errors import together

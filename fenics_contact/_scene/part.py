@@ -1,0 +1,82 @@
+"""What each part of a scene answers, and what it asks of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Protocol, Self
+
+from fenics_contact.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from fenics_contact._kinematics.base import Kinematics
+    from fenics_contact._scene.body import Body
+    from fenics_contact.mesh.body_mesh import BodyMesh
+
+
+class Around(Protocol):
+    """What a part needs to know of its scene."""
+
+    @property
+    def bodies(self) -> Mapping[str, Body]:
+        """Bodies by name."""
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """The kinematics of its bodies, which are all alike."""
+
+    @property
+    def deforms_much(self) -> bool:
+        """Whether one of its bodies does."""
+
+    @property
+    def is_nonlinear(self) -> bool:
+        """Whether some material's stress is no linear function of the displacement."""
+
+
+class Part:
+    """A load, a support, a pair or another part: the scene asks all of them alike."""
+
+    def check(self, scene: Around) -> None:
+        """Reject a part that does not suit the bodies of its scene."""
+
+    def in_scene(self, scene: Around) -> Self:
+        """Return the part as its scene holds it, with all that follows from the kinematics."""
+        return self
+
+
+def body_of(scene: Around, name: str, user: str) -> Body:
+    """Return a body by its name."""
+    if name not in scene.bodies:
+        raise InvalidInputError(
+            f"{user} names body {name!r}, the scene has {sorted(scene.bodies)}: use one of them"
+        )
+    return scene.bodies[name]
+
+
+def require_surface(scene: Around, body: str, surface: str, user: str) -> None:
+    """Reject a surface that is not there."""
+    mesh = body_of(scene, body, user).mesh
+    if surface not in mesh.surfaces:
+        raise _unknown(mesh, body, surface, user)
+
+
+def require_nodes(scene: Around, body: str, name: str, user: str) -> None:
+    """Reject a name of neither a surface nor a node set."""
+    mesh = body_of(scene, body, user).mesh
+    if name not in mesh.surfaces and name not in mesh.node_sets:
+        raise _unknown(mesh, body, name, user)
+
+
+def _unknown(mesh: BodyMesh, body: str, surface: str, user: str) -> InvalidInputError:
+    return InvalidInputError(
+        f"{user} names surface {surface!r} of body {body!r}, which has {sorted(mesh.surfaces)}: "
+        "use one of them"
+    )
+
+
+def require_vector(value: object, count: int, words: str, user: str, body: str) -> None:
+    """Reject a vector of numbers for another number of components."""
+    if isinstance(value, tuple) and len(value) != count:
+        raise InvalidInputError(
+            f"{user}.value of body {body!r} must hold {words}, got {value!r}: give {count} of them"
+        )
