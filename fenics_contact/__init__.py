@@ -2,7 +2,7 @@
 
 What a script needs is here; nothing is loaded before it is used:
 
-Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, Kept, ContactPair, Tie,
+Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, HoldCurrent, ContactPair, Tie,
     CyclicSymmetry, AutomaticContact, LoadStep, Preload, Section, ElasticFoundation, Spring, LinearConstraint,
     ConstraintTerm, box_partition
 
@@ -21,7 +21,7 @@ Equilibrium: solve_scene, solve_nested, solve_steps, ContactProblem, LoadSequenc
     TangentNewton, FixedPoint, Tolerance
 
 To an accuracy: solve_to, solve_steps_to, minimize_to, Limits, Level, AccurateResult, AccurateDesign,
-    CarriedState, quantity, goal_error, GoalError
+    TransferredState, quantity, goal_error, GoalError
 
 Results: State, LinearState, DeformedState, NewtonSteps, Status, contact_area,
     contact_width
@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     from fenics_contact._base.launching import clean_environment as clean_environment
     from fenics_contact._base.progress import PhaseTimer as PhaseTimer
     from fenics_contact._base.progress import show_progress as show_progress
-    from fenics_contact._equilibrium.carried import CarriedState as CarriedState
+    from fenics_contact._equilibrium.carried import TransferredState as TransferredState
     from fenics_contact._equilibrium.problem import ContactProblem as ContactProblem
     from fenics_contact._equilibrium.problem import solve_scene as solve_scene
     from fenics_contact._equilibrium.steps import LoadSequence as LoadSequence
@@ -119,7 +119,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.scene import Scene as Scene
     from fenics_contact._scene.sectors import CyclicSymmetry as CyclicSymmetry
     from fenics_contact._scene.springs import Spring as Spring
-    from fenics_contact._scene.supports import Kept as Kept
+    from fenics_contact._scene.supports import HoldCurrent as HoldCurrent
     from fenics_contact._scene.supports import RigidSurface as RigidSurface
     from fenics_contact._scene.supports import Roller as Roller
     from fenics_contact._scene.supports import Support as Support

@@ -73,7 +73,7 @@ class _Search:
     def __init__(self, problem: DualProblem, feasible: FeasibleSet, start: Vector) -> None:
         self._problem, self._feasible, self._start = problem, feasible, start
         self._coarse = problem.scaled_problem.coarse
-        self._factor = evening(problem)
+        self._factor = scaling_factors(problem)
         self._size = problem.norm(start) or 1.0
 
     def at(self, alpha: Vector) -> _Point:
@@ -122,7 +122,7 @@ class _Search:
         return (sp.diags(root) + discs).tocsr()
 
 
-def evening(problem: DualProblem) -> Vector:
+def scaling_factors(problem: DualProblem) -> Vector:
     """Return the factors of the scaled multipliers, one where stiffness is uniform, owned."""
     return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor
 
@@ -168,7 +168,7 @@ class Statuses:
 
     def settled(self, residual: Vector) -> Vector:
         """Return r without the rigid motions that fit it best on the free rows. Collective."""
-        scaled = self.free.T @ (evening(self.problem) * residual)
+        scaled = self.free.T @ (scaling_factors(self.problem) * residual)
         return residual - self.problem.coarse.transpose(self.coarse.coefficients(scaled))
 
 
@@ -251,7 +251,7 @@ def _balanced(
             if left <= ROUNDING:
                 return point, left
             lacking = rows @ coarse.transpose(coarse.solve(problem.coarse.residual(point)))
-            point = feasible.project(point - evening(problem) * lacking)
+            point = feasible.project(point - scaling_factors(problem) * lacking)
             before, left = left, _unbalanced(problem, point)
             if left > progress * before:
                 break

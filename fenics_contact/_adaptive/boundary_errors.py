@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenics_contact._accuracy.discretisation import CellEnergies, OfCells, Parts
+from fenics_contact._adaptive.boundary_defect import boundary_defect
 from fenics_contact._adaptive.contact_residuals import Places
-from fenics_contact._adaptive.way_to_images import way_to_images
 from fenics_contact._fem.loads import as_tractions
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.loads import Load, Traction
@@ -76,7 +76,7 @@ def _moved(scene: Scene, step: float) -> Scene | None:
         if body.mesh.order > 1 or isinstance(body, ToolBody):
             continue
         if body.mesh.origin.chart is not None:
-            way = way_to_images(body.mesh.origin)
+            way = boundary_defect(body.mesh.origin)
         else:
             curved = [surface_of(scene, Surface(name, each), "best") for each in body.mesh.shapes]
             curved = [surface for surface in curved if surface.relief is not None]

@@ -108,7 +108,7 @@ def between_nodes(state: LinearState, multiplier: np.ndarray, opening: float) ->
     )
     missed = np.where(state.contact.normal_force > 0.0, residual, (1.0 - opening) * residual)
     for index, pair in enumerate(torn.scene.contacts):
-        if not pair.within_body:
+        if not pair.is_self_contact:
             total += _of_pair(state, index, pair, pressing, missed)
     return float(torn.decomposition.comm.allreduce(total))
 
@@ -201,7 +201,7 @@ def of_pressures(state: LinearState, partials: Partials) -> float:
     rows = torn.numbering.gather(partials.by_multiplier, torn.normal_rows)
     total = 0.0
     for index, pair in enumerate(torn.scene.contacts):
-        slave = None if pair.within_body else _Slave(state, index)
+        slave = None if pair.is_self_contact else _Slave(state, index)
         if slave is None or slave.surface.order > 1:
             continue
         pressure = slave.at_nodes(state.contact.normal_force / points.area)

@@ -47,9 +47,9 @@ from fenics_contact.design.objective import (
     Objective,
     Partials,
     WeightedSum,
-    asking,
     finite_partials,
     finite_value,
+    guarded_user_call,
 )
 from fenics_contact.design.objectives import (
     LargestPressure,
@@ -176,12 +176,12 @@ def goal_error(
     with Task("error of a quantity"), one_thread(comm):
         # No node moves: derivatives by the shape are neither compiled nor evaluated.
         forms = ShapeForms.at_rest(state.torn)
-        with asking(comm):
+        with guarded_user_call(comm):
             value = finite_value(objective.value(state, forms))
         if not isinstance(state, LinearState):
             return _indicated(state, value)
         linear = state
-        with asking(comm):
+        with guarded_user_call(comm):
             if why := getattr(objective, "without_adjoint", ""):
                 return _without_adjoint(linear, value, why)
             smooth = smoothed(objective, state, forms)
@@ -216,7 +216,7 @@ def goal_error(
 
 def value_of(state: State, objective: Objective) -> float:
     """Return a quantity of a state; no node moves. Collective."""
-    with asking(comm_of(state)):
+    with guarded_user_call(comm_of(state)):
         return finite_value(objective.value(state, ShapeForms.at_rest(state.torn)))
 
 

@@ -17,8 +17,8 @@ from fenics_contact._adaptive.locking import locking_in_words
 from fenics_contact._adaptive.marking import bulk
 from fenics_contact._adaptive.quantities import quantity as named
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
-from fenics_contact._adaptive.small_spots import doubted_pairs, refined_at_spots
 from fenics_contact._adaptive.sticking_ends import depends_on_slip, refined_at_sticking_ends
+from fenics_contact._adaptive.underresolved_contact import refined_at_spots, underresolved_pairs
 from fenics_contact._base.checks import check_numbers, checked
 from fenics_contact._base.display import Table, displayed, tabled
 from fenics_contact._base.libraries import MPI
@@ -198,7 +198,7 @@ def solve_to(
     with together(comm):
         require_share(relative_error)
         objective = named(quantity, scene) if isinstance(quantity, str) else quantity
-    way = Way(objective, relative_error, limits or Limits(), comm)
+    way = AdaptiveLoop(objective, relative_error, limits or Limits(), comm)
     return followed(way, ContactProblem(scene, comm, solver=solver, tolerance=tolerance), callback)
 
 
@@ -211,11 +211,13 @@ def require_share(relative_error: float) -> None:
         )
 
 
-def followed(way: Way, first: ContactProblem, callback: Callable[[Level], None] | None) -> AccurateResult:
+def followed(
+    way: AdaptiveLoop, first: ContactProblem, callback: Callable[[Level], None] | None
+) -> AccurateResult:
     """Return the result of all levels from a first problem on. Collective."""
     scene, comm = first.scene, first.comm
     with Task("levels", most=way.limits.levels) as task:
-        warnings, problem = first.hold_warnings(), cast("ContactProblem | None", first)
+        warnings, problem = first.defer_warnings(), cast("ContactProblem | None", first)
         while problem is not None:
             level = way.add(problem)
             if callback is not None:
@@ -244,7 +246,7 @@ def followed(way: Way, first: ContactProblem, callback: Callable[[Level], None] 
     return result
 
 
-class Way:
+class AdaptiveLoop:
     """The levels so far."""
 
     where = ""  # of what they are, in words for warnings
@@ -264,7 +266,7 @@ class Way:
     def add(self, problem: ContactProblem) -> Level:
         """Solve on the next mesh and estimate its error. Collective."""
         self._state = self._solved(problem)
-        self._doubted, scene = doubted_pairs(self._state), self._state.scene
+        self._doubted, scene = underresolved_pairs(self._state), self._state.scene
         self._near_crossings.append(left_at_crossings(scene))
         state_value, value, error = self._estimated()
         level = Level(
@@ -283,7 +285,7 @@ class Way:
     @property
     def _missed(self) -> bool:
         """Whether surfaces touch between nodes, so that a quantity may be zero that is not."""
-        return any(isinstance(each, BetweenNodes) for each in self._state.peak_doubts)
+        return any(isinstance(each, BetweenNodes) for each in self._state.peak_uncertainties)
 
     def _solved(self, problem: ContactProblem) -> State:
         """Return the state on the next mesh. Collective."""

@@ -8,15 +8,15 @@ from functools import partial
 
 from fenics_contact._adaptive.levels import (
     AccurateResult,
+    AdaptiveLoop,
     Level,
     Limits,
-    Way,
     followed,
     require_share,
 )
 from fenics_contact._adaptive.quantities import quantity as named
 from fenics_contact._base.libraries import MPI
-from fenics_contact._equilibrium.carried import CarriedState
+from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import require_steps
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -46,8 +46,8 @@ def solve_steps_to(
     Every step begins on the meshes of the scene and refines them where its quantity needs that, as `solve_to`
     does: small cells follow a spot that moves on, and are not kept behind it. Slip is measured from the state
     before, and histories of materials go on from it, carried from its last meshes to each of the step's, see
-    `fenics_contact.CarriedState`. Errors are those of a step alone: what the state before was wrong by, and
-    what its histories lose on larger cells, is not part of them.
+    `fenics_contact.TransferredState`. Errors are those of a step alone: what the state before was wrong by,
+    and what its histories lose on larger cells, is not part of them.
 
     Args:
         scene: Bodies, contact pairs, and the supports and loads that the steps do not give, on coarse meshes.
@@ -79,24 +79,24 @@ def solve_steps_to(
         require_share(relative_error)
         objective = named(quantity, scene) if isinstance(quantity, str) else quantity
     results: list[AccurateResult] = []
-    last: _StepWay | None = None
+    last: _StepLoop | None = None
     for number, step in enumerate(steps, start=1):
         timed = step if step.time is not None else replace(step, time=float(number))
         with together(comm):
             scene = step.applied_to(scene)
-        last = _StepWay(timed, last, objective, relative_error, limits or Limits(), comm)
+        last = _StepLoop(timed, last, objective, relative_error, limits or Limits(), comm)
         show = None if callback is None else partial(callback, step)
         results.append(followed(last, ContactProblem(scene, comm, solver=solver, tolerance=tolerance), show))
     return tuple(results)
 
 
-class _StepWay(Way):
+class _StepLoop(AdaptiveLoop):
     """The levels of a load step after another one."""
 
     def __init__(
         self,
         step: LoadStep,
-        before: _StepWay | None,
+        before: _StepLoop | None,
         quantity: Objective,
         wanted: float,
         limits: Limits,
@@ -121,12 +121,12 @@ class _StepWay(Way):
             adjoint=True,
         )
 
-    def _carried(self, scene: Scene) -> CarriedState | None:
+    def _carried(self, scene: Scene) -> TransferredState | None:
         """Return the state of the step before on the meshes of now."""
         if self._before is None:
             return None
         (state, old), new = self._before, self._chains
         names = (name for name in scene.bodies if name in old or name in new)
-        return CarriedState(
+        return TransferredState(
             state, {name: MeshTransfer(old.get(name, ()), new.get(name, ())) for name in names}
         )

@@ -10,10 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fenics_contact._adaptive.goal_errors import goal_error, value_of
-from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, Way, followed, require_share
+from fenics_contact._adaptive.levels import (
+    AccurateResult,
+    AdaptiveLoop,
+    Level,
+    Limits,
+    followed,
+    require_share,
+)
 from fenics_contact._adaptive.refined_designs import refined_design, refined_for_designs
 from fenics_contact._adaptive.refined_scene import SceneRefinement
-from fenics_contact._adaptive.small_spots import doubted_pairs, refined_at_spots
+from fenics_contact._adaptive.underresolved_contact import refined_at_spots, underresolved_pairs
 from fenics_contact._base.display import Table, tabled
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._optimize.bundle_trust import BundleTrust, minimize
@@ -161,7 +168,7 @@ def _check(problem: ShapeProblem, constraints: ConstraintsOf | None) -> None:
             )
 
 
-class _Descent(Way):
+class _Descent(AdaptiveLoop):
     """The levels so far of an optimisation, each from the design of the one before."""
 
     constraints: ConstraintsOf | None = None
@@ -222,7 +229,7 @@ class _Descent(Way):
         `share`: of the estimated error, or of the error asked for where that is larger; `loosest`: largest
         part of the objective, also where a spot is too small for its cells.
         """
-        if doubted_pairs(state):
+        if underresolved_pairs(state):
             value, error = value_of(state, self.quantity), np.inf
         else:
             estimate = goal_error(state, self.quantity)

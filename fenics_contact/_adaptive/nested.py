@@ -70,7 +70,7 @@ def solve_nested(
     with together(comm):
         check_nested(scene, halvings, coarse_tolerance)
     problem = ContactProblem(scene, comm, solver=solver, tolerance=tolerance)
-    warnings = problem.hold_warnings()
+    warnings = problem.defer_warnings()
     state: LinearState | None = None
     refinements: Mapping[str, Refinement] | None = None
     with Task("meshes", most=halvings + 1) as task:

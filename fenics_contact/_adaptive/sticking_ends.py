@@ -8,7 +8,7 @@ from functools import reduce
 import numpy as np
 
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refined_again
-from fenics_contact._adaptive.small_spots import cells_at
+from fenics_contact._adaptive.underresolved_contact import cells_at
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
+from types import MappingProxyType
 from typing import Any
 
-__all__ = ["homes", "late_names"]
+__all__ = ["homes", "late_names", "warn_of_old_name"]
+
+
+def warn_of_old_name(old: str, new: str) -> None:
+    """Warn whoever uses a public name that is renamed; the old one stays for one minor version."""
+    text = f"{old} is now {new} and will be removed in the next minor version: use {new}"
+    warnings.warn(text, DeprecationWarning, stacklevel=3)
 
 
 @cache
@@ -25,10 +33,13 @@ def homes(package: str) -> dict[str, str]:
     return {name.asname or name.name: str(each.module) for each in statements for name in each.names}
 
 
-def late_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+def late_names(
+    package: str, renamed: Mapping[str, str] = MappingProxyType({})
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return ``__getattr__`` and ``__dir__`` of a package whose names stand below ``if TYPE_CHECKING``.
 
     A name that a submodule has, too, must be imported at once: the import of that submodule would hide it.
+    Old names of what is ``renamed`` load the new ones, with a `DeprecationWarning`.
 
     Example::
 
@@ -42,6 +53,9 @@ def late_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[st
 
     def load(name: str) -> Any:
         """Load a public name on first use."""
+        if name in renamed:
+            warn_of_old_name(f"{package}.{name}", renamed[name])
+            return getattr(module, renamed[name])
         if name not in module.__all__:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         home = homes(package)[name]

@@ -291,8 +291,8 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
         rows["held by nothing"] = " and ".join(map(str, state.unheld)) + ": stays where it is"
     if state.known_errors is not None:
         rows |= {f"error, {name}": words for name, words in state.known_errors.in_words.items()}
-    if state.peak_doubts:
-        rows["peak pressure"] = in_words(state.peak_doubts)
+    if state.peak_uncertainties:
+        rows["peak pressure"] = in_words(state.peak_uncertainties)
     rows["seconds"] = ", ".join(f"{name} {spent:.2f}" for name, spent in state.seconds.items())
     return {name: words for name, words in rows.items() if not words.startswith("nan")}
 

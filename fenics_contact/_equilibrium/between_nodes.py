@@ -98,7 +98,7 @@ def _missed(state: State, number: int) -> Missed | None:
     """Return where facets of a pair lie deeper than their nodes, None where none does. Collective."""
     scene, comm = state.scene, state.torn.decomposition.comm
     pair = scene.contacts[number]
-    if pair.within_body or pair.nodes is not None or pair.given_gap:
+    if pair.is_self_contact or pair.nodes is not None or pair.given_gap:
         return None
     found: Missed | None = None
     with together(comm):
@@ -391,12 +391,12 @@ def _free_points(
     entry, point = entry[order], point[order]
     turn, last = np.searchsorted(entry, [np.arange(len(entries)), np.arange(1, len(entries) + 1)])
     while True:  # those whose point an earlier one has ask for their next one
-        asking = np.flatnonzero(turn < last)
-        first = np.unique(point[turn[asking]], return_index=True)[1]
-        lost = np.delete(asking, first)
+        guarded_user_call = np.flatnonzero(turn < last)
+        first = np.unique(point[turn[guarded_user_call]], return_index=True)[1]
+        lost = np.delete(guarded_user_call, first)
         if not len(lost):
             break
         turn[lost] += 1
     found = np.full(len(entries), -1)
-    found[asking] = point[turn[asking]]
+    found[guarded_user_call] = point[turn[guarded_user_call]]
     return found

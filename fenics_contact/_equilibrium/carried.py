@@ -20,7 +20,7 @@ from fenics_contact.results.state import State
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class CarriedState:
+class TransferredState:
     """The state at the end of a load step as the start of the next, on meshes of the same family.
 
     - **Displacements** are interpolated to the new nodes, by the shape functions of the old cells in which
@@ -41,7 +41,7 @@ class CarriedState:
         >>> finer = refined(scene.bodies["block"].mesh, [0, 1])  # doctest: +SKIP
         >>> fine_body = replace(scene.bodies["block"], mesh=finer.mesh)  # doctest: +SKIP
         >>> pulled = replace(scene, bodies={"block": fine_body}, loads=[pull])  # doctest: +SKIP
-        >>> before = CarriedState(state, {"block": MeshTransfer(new=[finer])})  # doctest: +SKIP
+        >>> before = TransferredState(state, {"block": MeshTransfer(new=[finer])})  # doctest: +SKIP
         >>> after = ContactProblem(pulled, comm).solve(before=before)  # doctest: +SKIP
     """
 
@@ -63,8 +63,9 @@ class CarriedState:
         """
         if not self.fields.fits(scene):
             raise InvalidInputError(
-                "transfers of a CarriedState must lead from the meshes of its state to those of the scene, "
-                f"got others, of {sorted(self.transfers)}: give the refinements with which both were made"
+                "transfers of a TransferredState must lead from the meshes of its state to those of the "
+                f"scene, got others, of {sorted(self.transfers)}: give the refinements with which both were "
+                "made"
             )
         others = {
             "contact of bodies that deform much": bool(scene.contacts) and scene.deforms_much,

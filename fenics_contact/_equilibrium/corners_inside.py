@@ -90,7 +90,12 @@ def corner_between_nodes(state: State, number: int) -> BetweenNodes | None:
     Collective. None where there is none, and where its gaps are given.
     """
     pair, comm = state.scene.contacts[number], state.torn.decomposition.comm
-    if pair.within_body or pair.nodes is not None or pair.given_gap or not isinstance(pair.master, Surface):
+    if (
+        pair.is_self_contact
+        or pair.nodes is not None
+        or pair.given_gap
+        or not isinstance(pair.master, Surface)
+    ):
         return None
     with together(comm):
         corners = _Corners.of(state, number)

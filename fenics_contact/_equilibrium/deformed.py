@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes_on_obstacles, with_places
-from fenics_contact._equilibrium.carried import CarriedState
+from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.other_rows import prescribed_as_is
 from fenics_contact._equilibrium.outer_loops import outer_loops
 from fenics_contact._equilibrium.previous import Previous, Wanted
@@ -117,7 +117,7 @@ class DeformedEquilibria:
         equations, timer = self._equations, self._timer
         acted, begin, known = None, equations.at_rest(), None
         with timer.phase("assemble"):
-            if isinstance(before, CarriedState):
+            if isinstance(before, TransferredState):
                 acted, begin = self._on_meshes_of(scene, before)
                 before = before.state
             elif isinstance(before, DeformedState):
@@ -201,8 +201,8 @@ class DeformedEquilibria:
         rows = stored.get("snaps", ())
         snaps = tuple(Snap(fraction, way, work, int(stages)) for fraction, way, work, stages in rows)
         since = float(stored.get("since", 0.0))
-        rubbed = float(stored.get("rubbed", 0.0))
-        path = Path(whole, end, None, None, fractions, since, snaps, rubbed, end.effort)
+        earlier_friction_work = float(stored.get("rubbed", 0.0))
+        path = Path(whole, end, None, None, fractions, since, snaps, earlier_friction_work, end.effort)
         return _state_after(path, None, timer, None, stored.get("slip"))
 
     def _require_later(self, scene: Scene, earlier: float, time: float) -> None:
@@ -213,7 +213,7 @@ class DeformedEquilibria:
                 f"after {earlier:g}: give later times, or none"
             )
 
-    def _on_meshes_of(self, scene: Scene, carried: CarriedState) -> tuple[Loading, Configuration]:
+    def _on_meshes_of(self, scene: Scene, carried: TransferredState) -> tuple[Loading, Configuration]:
         """Return what acted in a state on other meshes and where it ended, on a scene's. Collective."""
         before = carried.state
         assert isinstance(before, DeformedState)
@@ -290,7 +290,7 @@ class DeformedEquilibria:
         return replace(load, torn=with_places(load.torn, self._places.by_number(load.torn.points)))
 
 
-def _places_of(before: State | CarriedState | None, dim: int) -> InFacets:
+def _places_of(before: State | TransferredState | None, dim: int) -> InFacets:
     """Return the places inside facets of a state before, by key, none on other meshes."""
     if not isinstance(before, DeformedState):
         return InFacets.none(dim)
@@ -394,7 +394,7 @@ def _state_after(
             contact = _of_moved(contact, evaluation.contact, path.start, before)
         if known is not None:
             contact = replace(contact, slip=known[0], slip_before=known[1])
-        energies = _energies(evaluation, path.rubbed)
+        energies = _energies(evaluation, path.earlier_friction_work)
     return DeformedState(
         torn=torn, solution=solution, torn_displacement=moved, contact=contact, energies=energies,
         seconds=dict(timer.seconds), equilibrium=end, load=path.load, begun=path.begun,
@@ -417,7 +417,7 @@ def _of_moved(
     return replace(contact, slip=slip, slip_before=slipped, area=areas.true, nominal_area=areas.nominal)
 
 
-def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
+def _energies(evaluation: ResidualState, earlier_friction_work: float) -> Energies:
     """Return the stored energy, the work of dead loads and of friction in the last load step. Collective.
 
     The work of pressures that follow their surfaces depends on the way: then it is not known.
@@ -431,7 +431,7 @@ def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
     work += sum(each.work for each in turned if each.free.any())
     given_way, kept = evaluation.torn.compliance.energies(evaluation.at.multiplier)
     surface = float(evaluation.torn.numbering.comm.allreduce(given_way - kept))
-    return Energies(strain, work, rubbed + evaluation.rubbing, surface=surface)
+    return Energies(strain, work, earlier_friction_work + evaluation.friction_work, surface=surface)
 
 
 def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
@@ -442,8 +442,8 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     below the tolerance: they are spread inside subdomains by tangents at the equilibrium, before by those of
     the last Newton step. Returns ``displacement`` of all copies of the nodes, shape (n_copies, dim),
     ``multiplier`` λ of all rows, the ``history`` of materials of each body, with the time and the largest
-    displacement, before the step of histories, the work of friction before it (``rubbed``), and the ``parts``
-    and ``snaps``; of moved bodies the facets that nodes touch, where, and the slip; else ``origin`` and
+    displacement, before the step of histories, the work of friction before it, and the ``parts`` and
+    ``snaps``; of moved bodies the facets that nodes touch, where, and the slip; else ``origin`` and
     ``slid``, from which slip is measured. All replicated.
     """
     decomposition, evaluation = state.torn.decomposition, state.equilibrium.evaluation
@@ -458,7 +458,7 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
         "times": np.array([at.time, state.equilibrium.time, at.largest]),
         "parts": np.array(state.fractions),
         "since": np.array(state.since),
-        "rubbed": np.array(state.energies.friction - evaluation.rubbing),
+        "rubbed": np.array(state.energies.friction - evaluation.friction_work),
         **{_stored_motion(place): motion for place, motion in at.motions.items()},
         "snaps": np.array([astuple(snap) for snap in state.snaps]),
     }

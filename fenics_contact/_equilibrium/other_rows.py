@@ -11,7 +11,7 @@ from fenics_contact._equilibrium.starts import carried_over
 from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.local_axes import same_axes
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Roller, Support
+from fenics_contact._scene.supports import AnySupport, HoldCurrent, RigidSurface, Roller, Support
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.decomposition import Decomposition, prescribed_along
@@ -59,15 +59,15 @@ def require_values_to_keep(step: LoadStep, scene: Scene) -> None:
     """Reject supports that are functions of time and keep what nodes have: they are asked on the way, too."""
     if callable(step.supports) and any(_keeps(support) for support in scene.supports):
         raise InvalidInputError(
-            f"supports of LoadStep {step.name!r} that are functions of time must have values, got Kept: give "
-            "those that keep what they have in a list, supports=[...]"
+            f"supports of LoadStep {step.name!r} that are functions of time must have values, got HoldCurrent: "
+            "give those that keep what they have in a list, supports=[...]"
         )
 
 
 def _keeps(support: AnySupport) -> bool:
     if isinstance(support, Roller):
-        return isinstance(support.displacement, Kept)
-    return isinstance(support, Support) and any(isinstance(each, Kept) for each in support.value)
+        return isinstance(support.displacement, HoldCurrent)
+    return isinstance(support, Support) and any(isinstance(each, HoldCurrent) for each in support.value)
 
 
 def _kept(support: AnySupport, scene: Scene, before: State) -> AnySupport:
@@ -91,7 +91,7 @@ def _kept(support: AnySupport, scene: Scene, before: State) -> AnySupport:
     plain[axes.nodes] = False
     moved = np.where(~np.isnan(known[every]) & plain[every, None], known[every], moved)
     value = [
-        NodeValues(mesh.points[nodes], moved[:, k]) if isinstance(each, Kept) else each
+        NodeValues(mesh.points[nodes], moved[:, k]) if isinstance(each, HoldCurrent) else each
         for k, each in enumerate(support.value)
     ]
     return replace(support, value=tuple(value))

@@ -66,7 +66,7 @@ def unmatched_nodes(state: State, number: int, alone: float = 0.99) -> Unmatched
     `alone`: weight of a node of the master above which a point lies on it.
     """
     contact, pair = state.contact, state.scene.contacts[number]
-    if pair.by_mortar or pair.within_body or not isinstance(pair.master, Surface):
+    if pair.by_mortar or pair.is_self_contact or not isinstance(pair.master, Surface):
         return None
     mine = contact.on_pair(number)
     weights = contact.points.master[mine[contact.normal_force[mine] > 0.0]]

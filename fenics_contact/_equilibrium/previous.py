@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from fenics_contact._equilibrium.carried import CarriedState
+from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.other_rows import (
     continued,
     has_rows_of,
@@ -65,14 +65,14 @@ class Previous:
     meshes; None: zero; `known`: of which parts may be reused; None: nothing.
     """
 
-    before: State | CarriedState | None = None
+    before: State | TransferredState | None = None
     start: State | CoarseStart | None = None
     known: State | None = None
 
     @property
     def last(self) -> State | None:
         """The state at the end of the load step before, on its meshes."""
-        return self.before.state if isinstance(self.before, CarriedState) else self.before
+        return self.before.state if isinstance(self.before, TransferredState) else self.before
 
     @property
     def is_coarser(self) -> bool:
@@ -81,7 +81,7 @@ class Previous:
 
     def check(self, scene: Scene) -> None:
         """Reject what cannot be carried to the meshes of a scene."""
-        if isinstance(self.before, CarriedState):
+        if isinstance(self.before, TransferredState):
             self.before.check(scene)
 
     def kept(self, scene: Scene) -> Scene:
@@ -110,8 +110,8 @@ class Previous:
         return torn if self.before is None else torn.with_slip_from(*_slip_origin(self.before, torn))
 
 
-def _slip_origin(before: State | CarriedState, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
-    if isinstance(before, CarriedState):
+def _slip_origin(before: State | TransferredState, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
+    if isinstance(before, TransferredState):
         scene = before.scene_on(torn.scene)
         was = build_torn_system(scene, torn.decomposition, overlap=True, previous=torn)
         return before.slip_origin(with_points_inside(was, torn))

@@ -13,7 +13,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
-from fenics_contact._equilibrium.carried import CarriedState
+from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.linear import DirectEquilibria, LinearEquilibria, default_solver
 from fenics_contact._equilibrium.other_rows import continued
 from fenics_contact._equilibrium.previous import Equilibria, Previous, Wanted
@@ -153,7 +153,7 @@ class ContactProblem:
         other._warnings = self._warnings
         return other
 
-    def hold_warnings(self) -> ContactWarnings:
+    def defer_warnings(self) -> ContactWarnings:
         """Let only the last state be warned of, when the `ContactWarnings` of the result are logged."""
         self._warnings = ContactWarnings(of_last=True)
         return self._warnings
@@ -202,7 +202,7 @@ class ContactProblem:
         scene: Scene | None = None,
         *,
         start: State | Literal["last"] | None = "last",
-        before: State | CarriedState | None = None,
+        before: State | TransferredState | None = None,
         tolerance: Tolerance = None,
         design: bool = False,
         step: LoadStep | None = None,
@@ -217,7 +217,7 @@ class ContactProblem:
                 last one; None for ``before``. Nonlinear materials start from ``before``, or
                 with ``refinements`` in the first step from here.
             before: State at the end of the load step before, from which slip is measured and histories of
-                materials go on, also one on other meshes, see `CarriedState`; None: the undeformed bodies.
+                materials go on, also one on other meshes, see `TransferredState`; None: undeformed bodies.
             tolerance: Overrides the problem's tolerance.
             design: Whether it is the state of a design: its bodies may overlap before they are loaded, and
                 derivatives are wanted, which need the dual system and a number for default tolerance.

@@ -16,7 +16,7 @@ from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.plan import MOTION_ROUNDING, held_components, point_loads, resisted_motions
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.foundations import foundation_stiffness, separated
 from fenics_contact.feti.row_groups import Joint
@@ -431,7 +431,7 @@ def unresisted_motions(torn: TornSystem, *, sprung: bool = True) -> tuple[Unheld
     Contact counts wherever its surfaces face each other, also across a gap, and in both directions. Surfaces
     with friction and obstacles that move may meet anywhere later: they count against all motions.
     """
-    return made_once(torn.numbering.comm, lambda: _unresisted(torn, sprung))
+    return on_root_then_bcast(torn.numbering.comm, lambda: _unresisted(torn, sprung))
 
 
 def require_resisted(motions: tuple[UnheldMotion, ...], torn: TornSystem, prescribed: np.ndarray) -> None:

@@ -31,7 +31,7 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.linear_state import LinearState
-from fenics_contact.results.resolution import BetweenNodes, FacetsOutside, PeakDoubt
+from fenics_contact.results.resolution import BetweenNodes, FacetsOutside, PeakUncertainty
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
@@ -105,11 +105,11 @@ class ContactWarnings:
         else:
             peaks = self._doubts_of_deformed(state)
         self._warn_of_large_rotations(state)
-        return replace(state, peak_doubts=(*peaks, *self._passing_bodies(state)))
+        return replace(state, peak_uncertainties=(*peaks, *self._passing_bodies(state)))
 
-    def _doubts_of_deformed(self, state: State) -> tuple[PeakDoubt, ...]:
+    def _doubts_of_deformed(self, state: State) -> tuple[PeakUncertainty, ...]:
         """Warn of pairs of nonlinear materials that slide too far or are too small for cells. Collective."""
-        peaks, scene, pressed_in = list[PeakDoubt](), state.scene, _indentation(state)
+        peaks, scene, pressed_in = list[PeakUncertainty](), state.scene, _indentation(state)
         for number, pair in enumerate(scene.contacts):
             for each in [] if scene.deforms_much else _slid_far(state, number):
                 self._log_doubt(state, each)
@@ -155,10 +155,10 @@ class ContactWarnings:
         for log, words in self._held or ():
             safe_log(log, "%s", words)
 
-    def _doubts(self, state: LinearState) -> tuple[list[Doubt], tuple[PeakDoubt, ...]]:
+    def _doubts(self, state: LinearState) -> tuple[list[Doubt], tuple[PeakUncertainty, ...]]:
         """Return all doubts about a state, and those about peaks. Collective."""
         torn, contact, found = state.torn, state.contact, list[Doubt]()
-        peaks = list[PeakDoubt]()
+        peaks = list[PeakUncertainty]()
         if contact.points.count == 0:
             return found, ()
         if contact.points is not self._points:
@@ -441,7 +441,12 @@ def _finer_gap(torn: TornSystem) -> np.ndarray:
 def _passing_nodes(state: State, number: int, moved: float) -> list[Doubt]:
     """Return the doubt about a pair whose master passes between the nodes of its slave. Collective."""
     pair = state.scene.contacts[number]
-    if pair.by_mortar or not isinstance(pair.master, Surface) or pair.within_body or pair.nodes is not None:
+    if (
+        pair.by_mortar
+        or not isinstance(pair.master, Surface)
+        or pair.is_self_contact
+        or pair.nodes is not None
+    ):
         return []
     deep = _depth(state, number, pair, pair.master)
     if pair.closure is not None:
@@ -552,7 +557,7 @@ def _on_contact(scene: Scene) -> str:
     """
 
     def by_nodes(pair: ContactPair) -> bool:
-        return isinstance(pair.master, Surface) and not pair.by_mortar and not pair.within_body
+        return isinstance(pair.master, Surface) and not pair.by_mortar and not pair.is_self_contact
 
     if not any(map(by_nodes, scene.contacts)):
         return ""

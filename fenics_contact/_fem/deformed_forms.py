@@ -10,7 +10,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact._fem.composition import integrate
-from fenics_contact._fem.heated import as_stretched, heat_expands, on_stretched
+from fenics_contact._fem.heated import heat_expands, on_stretched, thermal_split
 from fenics_contact._fem.templates import (
     UNSEEN,
     Constants,
@@ -88,7 +88,7 @@ def _written(kind: str, materials: tuple[Material, ...], element: Element) -> Wr
         if not heat_expands(material):
             return density(material, fields, constants)
         stretch = 1 + constants[-1] * change
-        now = as_stretched(stretch, moved, v, du)
+        now = thermal_split(stretch, moved, v, du)
         swelling = stretch**3
         heated = fields._replace(
             u=now[0], v=now[1], du=now[2], dilatation=dilatation / swelling, swelling=swelling

@@ -14,7 +14,7 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.composition import Composition, integrate, material_sets
-from fenics_contact._fem.heated import as_stretched, on_stretched
+from fenics_contact._fem.heated import on_stretched, thermal_split
 from fenics_contact._fem.load_forms import (
     FIRST_COUNT,
     Symbol,
@@ -348,7 +348,7 @@ def stress_in_space(material: Material, u: Expr, constants: Constants, at: AtRes
     if isinstance(material, Hyperelasticity):
         if at.temperature is None or not material.expands:
             return material.cauchy(u, constants)
-        (moved,) = as_stretched(1 + constants[-1] * at.temperature, u)
+        (moved,) = thermal_split(1 + constants[-1] * at.temperature, u)
         return on_stretched(material.cauchy(moved, constants), at.element)
     stress = stress_left(material, u, constants, at)
     if stress.ufl_shape == (3, 3):

@@ -18,7 +18,7 @@ from fenics_contact.materials.plastic import HistoryMaterial
 
 if TYPE_CHECKING:
     from fenics_contact._kinematics.element import Element
-    from fenics_contact._kinematics.stand_ins import StandIn
+    from fenics_contact._kinematics.stand_ins import LiftedCoefficient
 
 
 def heat_expands(material: Any) -> bool:
@@ -26,7 +26,7 @@ def heat_expands(material: Any) -> bool:
     return is_nonlinear(material) and can_expand(material) and not isinstance(material, HistoryMaterial)
 
 
-def as_stretched(stretch: Expr, displacement: Expr, *others: Expr) -> tuple[StandIn, ...]:
+def thermal_split(stretch: Expr, displacement: Expr, *others: Expr) -> tuple[LiftedCoefficient, ...]:
     """Return stand-ins for a displacement and for other fields, test functions among them."""
     from fenics_contact._kinematics.stand_ins import stand_in  # others go without
 

@@ -20,7 +20,7 @@ from fenics_contact._base.requirements import check_compiler
 from fenics_contact._kinematics.element import Element
 from fenics_contact._kinematics.integration import FULL
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.mesh.cell_types import quadrature, shape_values
 from fenics_contact.mesh.quality import jacobians
 
@@ -131,7 +131,7 @@ class Templates:
         try:
             return Template(self._comm, form, constants, coefficients)
         except Exception as error:  # on all ranks
-            made_once(self._comm, check_compiler)
+            on_root_then_bcast(self._comm, check_compiler)
             raise InvalidInputError(
                 f"{what} must be UFL that compiles, got {type(error).__name__}: {error}: check quotients, "
                 "roots and logarithms in it, also at rest (F = I), and that the "

@@ -19,7 +19,7 @@ from fenics_contact.errors import InvalidInputError
 _IN_SPACE = "tetrahedron"
 
 
-class StandIn(ufl.Coefficient):
+class LiftedCoefficient(ufl.Coefficient):
     """A displacement in space of which value and gradient are known as expressions.
 
     Attributes:
@@ -31,9 +31,9 @@ class StandIn(ufl.Coefficient):
     gradient: Expr
 
 
-def stand_in(number: int, value: Expr, gradient: Expr) -> StandIn:
+def stand_in(number: int, value: Expr, gradient: Expr) -> LiftedCoefficient:
     """Return a stand-in; ``number`` distinguishes those of one form."""
-    made = StandIn(_dolfinx.displacement_space(_IN_SPACE), number)
+    made = LiftedCoefficient(_dolfinx.displacement_space(_IN_SPACE), number)
     made.value, made.gradient = value, gradient
     return made
 
@@ -54,9 +54,9 @@ class _Replaced(MultiFunction):  # type: ignore[misc]
 
     def grad(self, o: Expr) -> Expr:
         (of,) = o.ufl_operands
-        if not any(isinstance(each, StandIn) for each in extract_coefficients(of)):
+        if not any(isinstance(each, LiftedCoefficient) for each in extract_coefficients(of)):
             return o
-        if not isinstance(of, StandIn):
+        if not isinstance(of, LiftedCoefficient):
             raise InvalidInputError(
                 "materials of bodies of revolution may depend on the displacement and its gradient alone, "
                 f"got the gradient of {of}: write them in terms of grad(u)"
@@ -64,7 +64,7 @@ class _Replaced(MultiFunction):  # type: ignore[misc]
         return of.gradient
 
     def coefficient(self, o: Expr) -> Expr:
-        return o.value if isinstance(o, StandIn) else o
+        return o.value if isinstance(o, LiftedCoefficient) else o
 
     def spatial_coordinate(self, o: Expr) -> Expr:
         return self._place if len(o) == 3 else o

@@ -15,9 +15,9 @@ from fenics_contact._fem.mechanics import FROM_REST, MaterialStep, Mechanics, Re
 from fenics_contact._large_deformations.loading import Loading, RigidStart
 from fenics_contact._large_deformations.moving_contact import (
     NO_ROWS,
+    AuxiliaryRows,
     Contact,
     ContactConfiguration,
-    FurtherRows,
     MovingContact,
     stiffened,
     unsymmetric_at,
@@ -167,7 +167,7 @@ class ResidualState:
         return self.at.contact
 
     @property
-    def rubbing(self) -> float:
+    def friction_work(self) -> float:
         """Work of friction Σ τ·slip since histories began their step, [force · length]. Collective."""
         _, friction = self.contact.at_points(self.at.multiplier)
         _, against = self.contact.at_points(self.constraint_residual)
@@ -243,7 +243,7 @@ class ResidualState:
                 tangents = stiffened(torn, tangents, turning.normal)
             if turning.count:
                 torn = self.contact.with_rows_of(turning)
-                further = FurtherRows.of(torn, self.torn, turning)
+                further = AuxiliaryRows.of(torn, self.torn, turning)
         right = np.concatenate([self.constraint_residual, np.zeros(further.count)])
         if torn.free.count:
             load, stiffness = self.torn.free_imbalance(self.at.multiplier), None
@@ -273,7 +273,7 @@ class Linearisation:
     """
 
     system: TangentSystem
-    further: FurtherRows
+    further: AuxiliaryRows
 
     def release_factors(self) -> None:
         """Hand the factorisation to the next linearisation; do not use this one afterwards."""

@@ -179,8 +179,8 @@ class Path:
     `start`: these in material coordinates of the master, of others where they were first found; None where
     contact is that of the undeformed bodies; `fractions`: parts of the load at which equilibria were found,
     the last one being 1; `since`: the part from which slip and the histories of materials are one step up to
-    the end: 0, unless parts are steps of their own or bodies snapped; `rubbed`: work of friction before the
-    last step of histories, zero where the whole load is one, [force · length]; `effort`: that of all parts,
+    the end: 0, unless parts are steps of their own or bodies snapped; `earlier_friction_work`: that
+    before the last step of histories, zero where the whole load is one, [force · length]; `effort`: that of all parts,
     those that were cut included.
     """
 
@@ -191,7 +191,7 @@ class Path:
     fractions: tuple[float, ...]
     since: float
     snaps: tuple[Snap, ...]
-    rubbed: float
+    earlier_friction_work: float
     effort: Effort
 
 
@@ -285,14 +285,14 @@ class AutomaticSteps:
         begun = first.at_motions(start.motions)
         at = start if start.contact else start.on(equations.contact.at(begun, start.displacement, None))
         assert at.contact is not None
-        way = _Way(self, equations, first, target, at.contact, timer)
+        way = _LoadStepFollower(self, equations, first, target, at.contact, timer)
         now = Progress(at, first.torn, known, (at, first.torn), at.contact.start)
         if near is not None:
             now = way.from_near(now, near)
         with _Parts() as parts:
             return way.path(self._followed(way, now, parts, held=held))
 
-    def _followed(self, way: _Way, now: Progress, parts: _Parts, *, held: bool) -> Progress:
+    def _followed(self, way: _LoadStepFollower, now: Progress, parts: _Parts, *, held: bool) -> Progress:
         """Return the progress at the end of the way. Collective."""
         equations, first, target = way.equations, way.first, way.target
         part = self.first
@@ -322,8 +322,8 @@ class AutomaticSteps:
 class Progress:
     """Equilibria found so far on the way to a load, and their cost.
 
-    `origin`: where the step of histories begins, with the system of then; `rubbed`: work of friction before
-    that step; `ended`: whether the last equilibrium ends one.
+    `origin`: where the step of histories begins, with the system of then; `earlier_friction_work`: that
+    before the step; `ended`: whether the last equilibrium ends one.
     """
 
     at: Configuration
@@ -336,7 +336,7 @@ class Progress:
     fractions: tuple[float, ...] = ()
     snaps: tuple[Snap, ...] = ()
     since: float = 0.0
-    rubbed: float = 0.0
+    earlier_friction_work: float = 0.0
     ended: bool = False
     effort: Effort = NO_EFFORT
 
@@ -348,16 +348,16 @@ class Progress:
         self, fraction: float, found: NonlinearEquilibrium, since: float, *, anew: bool, ends: bool
     ) -> Progress:
         """Return it with another equilibrium; histories begin anew there, or it ends a step. Collective."""
-        rubbed = self.rubbed
+        earlier_friction_work = self.earlier_friction_work
         if self.end is not None and (self.ended or anew):
-            rubbed += self.end.evaluation.rubbing
+            earlier_friction_work += self.end.evaluation.friction_work
         at = found.configuration if ends else found.continued(self.origin[0])
         torn, new = found.evaluation.torn, found.evaluation.contact.start
         start = new if self.start is None or new is None else self.start.extended(new)
         return replace(
             self, at=at, torn=torn, known=found.linearisation, origin=(at, torn) if ends else self.origin,
             start=start, end=found, reached=fraction, fractions=(*self.fractions, fraction), since=since,
-            rubbed=rubbed, ended=ends,
+            earlier_friction_work=earlier_friction_work, ended=ends,
         )  # fmt: skip
 
 
@@ -393,7 +393,7 @@ class _Parts:
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
+class _LoadStepFollower:
     """The way from one load to another, in parts."""
 
     steps: AutomaticSteps
@@ -463,7 +463,15 @@ class _Way:
         assert now.end is not None
         load = self.target.between(self.first, now.reached)
         return Path(
-            load, now.end, self.begun, now.start, now.fractions, now.since, now.snaps, now.rubbed, now.effort
+            load,
+            now.end,
+            self.begun,
+            now.start,
+            now.fractions,
+            now.since,
+            now.snaps,
+            now.earlier_friction_work,
+            now.effort,
         )
 
     def _ends(self, now: Progress, reason: str) -> PathEndsError:

@@ -40,7 +40,7 @@ _NONE = np.zeros(0, dtype=np.int64)
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class UnevenStiffness:
+class UnsymmetricLowRank:
     """An unsymmetric stiffness L Rᵀ of few columns.
 
     `owner`: node whose rank owns the rows of a column.
@@ -73,7 +73,7 @@ class RowCorrections:
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class TurningForces:
+class FollowerStiffness:
     """How forces change as surfaces turn under them, at fixed multipliers, and gaps other than by their rows.
 
     `normal`: of the normal forces of contact, symmetric; None where contact points do not move; `forces`:
@@ -94,10 +94,10 @@ class TurningForces:
     def of(
         cls,
         normal: GeometricStiffness | None,
-        others: Sequence[UnevenStiffness],
+        others: Sequence[UnsymmetricLowRank],
         normal_owner: np.ndarray = _NONE,
         corrections: RowCorrections | None = None,
-    ) -> TurningForces:
+    ) -> FollowerStiffness:
         """Return those of several stiffnesses, with at least one unsymmetric one."""
         others = [each for each in others if each.left.shape[1]] or others[:1]
         L, R = (_joined([getattr(each, side) for each in others]) for side in ("left", "right"))
@@ -111,7 +111,9 @@ class TurningForces:
         stiffness = (left * right)[kept]
         return cls(normal, normal_owner, forces, displacements, stiffness, owner[kept], corrections)
 
-    def with_springs(self, columns: sp.csr_matrix, stiffness: np.ndarray, owner: np.ndarray) -> TurningForces:
+    def with_springs(
+        self, columns: sp.csr_matrix, stiffness: np.ndarray, owner: np.ndarray
+    ) -> FollowerStiffness:
         """Return those with springs, whose rows come after those of normal forces."""
         if not len(owner):
             return self
@@ -130,7 +132,7 @@ class TurningForces:
 
     @property
     def columns(self) -> list[tuple[sp.csr_matrix, np.ndarray]]:
-        """Columns of all rows with the nodes whose ranks own them, in the order of `FurtherRows`."""
+        """Columns of all rows with the nodes whose ranks own them, in the order of `AuxiliaryRows`."""
         parts = [] if self.normal is None else [(self.normal.columns, self.normal_owner)]
         parts += [(self.forces, self.owner), (self.displacements, self.owner)]
         if self.corrections is not None:
@@ -158,7 +160,7 @@ def _lengths(columns: sp.csr_matrix) -> np.ndarray:
 
 def unsymmetric_at(
     decomposition: Decomposition, stiffness: sp.csr_matrix, nodes: np.ndarray
-) -> UnevenStiffness:
+) -> UnsymmetricLowRank:
     """Return the unsymmetric part of a torn stiffness on the free dofs of some nodes. Collective."""
     tearing, dim = decomposition.tearing, decomposition.tearing.components
     here, block = decomposition.held
@@ -184,12 +186,12 @@ def unsymmetric_at(
     changed = np.flatnonzero(np.diff(matrix.indptr))
     entries = np.ones(len(changed)), (changed, np.arange(len(changed)))
     left = sp.csr_matrix(entries, shape=(len(free), len(changed)))
-    return UnevenStiffness(left, matrix[changed].T.tocsr(), changed // dim)
+    return UnsymmetricLowRank(left, matrix[changed].T.tocsr(), changed // dim)
 
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class FurtherRows:
+class AuxiliaryRows:
     """The rows of turning forces, after all others; positions are among all owned rows.
 
     `compliance`: of rows of normal forces, of either sign, zero of others, owned; `force_rows`: positions of
@@ -210,7 +212,7 @@ class FurtherRows:
     correction: Vector
 
     @classmethod
-    def of(cls, torn: TornSystem, before: TornSystem, turning: TurningForces) -> FurtherRows:
+    def of(cls, torn: TornSystem, before: TornSystem, turning: FollowerStiffness) -> AuxiliaryRows:
         """Return those of a system, given the one before without them."""
         begin, normal = len(before.numbering.owned), len(turning.compliance)
         number = torn.numbering.owned[begin:] - before.numbering.total
@@ -235,7 +237,7 @@ class FurtherRows:
         """Number of rows of this rank."""
         return len(self.compliance)
 
-    def scaled(self, s: Vector) -> FurtherRows:
+    def scaled(self, s: Vector) -> AuxiliaryRows:
         """Return the rows for multipliers λ / s, with s of all owned rows."""
         return replace(
             self,
@@ -276,7 +278,7 @@ class TurningRows(RowGroup):
         return -self.fields.T @ fields
 
 
-NO_ROWS = FurtherRows(np.zeros(0), _NONE, _NONE, np.zeros(0), _NONE, _NONE, np.zeros(0))
+NO_ROWS = AuxiliaryRows(np.zeros(0), _NONE, _NONE, np.zeros(0), _NONE, _NONE, np.zeros(0))
 
 
 def stiffened(
@@ -369,18 +371,18 @@ class ContactConfiguration:
         )
         return np.asarray(across & held)
 
-    def turning(self, multiplier: Vector, pressure: UnevenStiffness | None) -> TurningForces | None:
+    def turning(self, multiplier: Vector, pressure: UnsymmetricLowRank | None) -> FollowerStiffness | None:
         """Return the stiffness of forces that turn with their surfaces; None without any. Collective."""
         further = [] if pressure is None else [pressure]
         if self.points is None or self.start is None:
-            return TurningForces.of(None, further) if further else None
+            return FollowerStiffness.of(None, further) if further else None
         normal, friction = self.at_points(multiplier)
         points, slave, normal = self.points, self.points.points.slave, np.maximum(normal, 0.0)
         stiffness, torn = points.stiffness(normal), self.torn
         apart = torn.compliance.contact is not None
         means = points.mean_tangents(normal, friction, self.start, apart=apart)
         further += [
-            UnevenStiffness(each.left, each.right, slave[each.point])
+            UnsymmetricLowRank(each.left, each.right, slave[each.point])
             for each in (points.friction_stiffness(friction), means.stiffness)
         ]
         width, frictional = self.torn.components - 1, self.torn.frictional
@@ -390,7 +392,7 @@ class ContactConfiguration:
         rows = sp.vstack([-means.gap, slips[rubbed]], "csr")
         point = np.concatenate([np.arange(len(slave)), rubbed // width])
         corrections = RowCorrections.of(rows, slave[point])
-        return TurningForces.of(stiffness, further, slave[stiffness.point], corrections)
+        return FollowerStiffness.of(stiffness, further, slave[stiffness.point], corrections)
 
     def carried(self, values: Vector, other: ContactConfiguration, spread: bool = False) -> Vector:
         """Return a vector on the rows of other points on the rows of these. Collective.
@@ -440,7 +442,7 @@ class ContactConfiguration:
         usual = values[values > 0.0].mean() if np.any(values > 0.0) else 1.0
         return np.where(carried > 0.0, carried, usual)
 
-    def with_rows_of(self, turning: TurningForces) -> TornSystem:
+    def with_rows_of(self, turning: FollowerStiffness) -> TornSystem:
         """Return the system with the rows of turning forces after all others, in lengths. Collective."""
         decomposition = self.torn.decomposition
         points = self.torn.points if self.points is None else self.points.points

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns
-from fenics_contact._large_deformations.moving_contact import FurtherRows
+from fenics_contact._large_deformations.moving_contact import AuxiliaryRows
 from fenics_contact._large_deformations.tangent import TangentSystem
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.face import Face, classify
@@ -64,7 +64,7 @@ class TangentProblem:
     stiffness: sp.csr_matrix
     multiplier: Vector
     residual: Vector
-    further: FurtherRows
+    further: AuxiliaryRows
     flexibility: float
     resisted: Resisted = EVERY_MOTION
 

@@ -21,7 +21,7 @@ from fenics_contact._optimize.merit import (
     first_soft,
     merit_planes,
     multipliers,
-    priced_step,
+    penalised_step,
     restored,
     surroundings,
     verified,
@@ -31,9 +31,9 @@ from fenics_contact._optimize.merit import (
 from fenics_contact._optimize.nonlinear import ConstraintValue, NonlinearConstraint, scaled_constraints
 from fenics_contact._optimize.objective import Accuracy, Evaluation, Fun, Remarked, can_be_inexact
 from fenics_contact._optimize.problem import (
-    Demand,
+    CheckedProblem,
     Known,
-    PosedProblem,
+    OracleAccuracy,
     again,
     demand,
     evaluate_constraint,
@@ -50,7 +50,7 @@ Array = NDArray[np.float64]
 _LOG = logging.getLogger(__name__)
 
 
-def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) -> Evaluation:
+def first_centre(problem: CheckedProblem, subgradient: float, feasibility: float) -> Evaluation:
     """Evaluate the starting point, corrected to meet the equalities where it need not be feasible."""
     equal, accuracy = problem.equalities, Accuracy(np.inf, subgradient)
     penalties = dict.fromkeys(problem.inequalities, 1.0)
@@ -252,7 +252,7 @@ class BundleTrust:
         return self.value_scale or min(1.0, abs(first)) or 1.0
 
     def minimize(
-        self, problem: PosedProblem, callback: Callback | None = None, checkpoint: Checkpoint | None = None
+        self, problem: CheckedProblem, callback: Callback | None = None, checkpoint: Checkpoint | None = None
     ) -> Result:
         """Run the method on a checked problem; `fenics_contact.minimize` is the usual entry point.
 
@@ -273,7 +273,7 @@ class _Run:
     """The method on a problem: `start`, then `step` until it has a reason to stop, then `conclude`."""
 
     method: BundleTrust
-    problem: PosedProblem
+    problem: CheckedProblem
 
     def to_the_stop(self, progress: Progress) -> tuple[MethodState, Reason]:
         """Run from where an earlier run ended, or from the start, to the stop."""
@@ -345,7 +345,7 @@ class _Run:
     def _guarded_step(self, state: MethodState) -> tuple[Step, MethodState]:
         """Solve the step's programme, with t small enough to stay in the trust region."""
         near, trust = surroundings(self.problem, state.centre), state.trust
-        step, soft = priced_step(state.bundle, near, trust.t, state.soft, self.method.feasibility)
+        step, soft = penalised_step(state.bundle, near, trust.t, state.soft, self.method.feasibility)
         while step.length > 1.001 * trust.radius and not trust.exhausted:
             # A kink can keep the length constant while t falls, so t must be able to fall fast.
             t = trust.t * max(0.05, min(0.5, 0.95 * trust.radius / step.length))
@@ -354,7 +354,9 @@ class _Run:
         state = replace(state, trust=trust, soft=soft)
         return step, replace(state, multipliers=multipliers(self.problem, state, step))
 
-    def _demand(self, state: MethodState, step: Step, test: StoppingTest, reach: float = 0.0) -> Demand:
+    def _demand(
+        self, state: MethodState, step: Step, test: StoppingTest, reach: float = 0.0
+    ) -> OracleAccuracy:
         """Return the accuracy that a trial of the step needs, or a claim about points within ``reach``."""
         norm = float(np.linalg.norm(state.bundle.gradients[0]))
         norm += sum(one.penalty * float(np.linalg.norm(one.bundle.gradients[0])) for one in state.soft)
@@ -423,7 +425,7 @@ class _Run:
     def _violated(self, state: MethodState) -> bool:
         return self.problem.constraints_at(state.centre).violation > self.method.feasibility
 
-    def _advanced(self, state: MethodState, step: Step, needed: Demand) -> MethodState:
+    def _advanced(self, state: MethodState, step: Step, needed: OracleAccuracy) -> MethodState:
         """Try the step and return the state after its null, serious or rejected trial."""
         # The subproblem meets constraints only to its tolerance: the projected step is tried and recorded.
         x = self.problem.allowed.project(state.centre.x + self.problem.scale * step.move)

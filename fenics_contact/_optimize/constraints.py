@@ -115,7 +115,7 @@ class LinearConstraints:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class LocalFeasibleSet:
     """The feasible set seen from a point x, for a step y in scaled variables (x + scale·y).
 
     `rows`: C of C y ≤ room, every row of length one; `room`: distance to each row; negative where x violates
@@ -194,7 +194,7 @@ class FeasibleSet:
         found = [names[given[k]] for k in contradicting(rows[given], limits[given], equal)]
         return f": {', '.join(found)}" if found else ""
 
-    def around(self, x: Array, scale: Array) -> Surroundings:
+    def around(self, x: Array, scale: Array) -> LocalFeasibleSet:
         """Return the constraints on a step y from x in scaled variables."""
         unit = np.eye(x.size)
         below, above = (x - self.lower) / scale, (self.upper - x) / scale
@@ -203,7 +203,7 @@ class FeasibleSet:
         rows, room = unit_rows(self.matrix * scale, self.limit - self.matrix @ x)
         gap = self.equality_value - self.equality_matrix @ x
         equality, miss = unit_rows(self.equality_matrix * scale, gap)
-        return Surroundings(
+        return LocalFeasibleSet(
             rows=np.vstack([rows, -unit[low], unit[high]]),
             room=np.concatenate([room, below[low], above[high]]),
             equality_rows=np.vstack([equality, unit[fixed]]),

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenics_contact._optimize.bundle import Bundle, Plane, SubproblemError, shortest, unit_rows
-from fenics_contact._optimize.constraints import Surroundings
+from fenics_contact._optimize.constraints import LocalFeasibleSet
 from fenics_contact._optimize.nonlinear import Scaled, SoftConstraint, scaled_constraints
 from fenics_contact._optimize.objective import Evaluation
-from fenics_contact._optimize.problem import Known, PosedProblem, evaluate_constraint
+from fenics_contact._optimize.problem import CheckedProblem, Known, evaluate_constraint
 from fenics_contact._optimize.result import MethodState
 from fenics_contact._optimize.subproblem import Step, solve_step
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
@@ -23,14 +23,14 @@ from fenics_contact.errors import InvalidDesignError, InvalidInputError
 Array = NDArray[np.float64]
 
 
-def surroundings(problem: PosedProblem, centre: Evaluation) -> Surroundings:
+def surroundings(problem: CheckedProblem, centre: Evaluation) -> LocalFeasibleSet:
     """Return linear constraints and linearised equalities around a centre, in scaled variables."""
     near = problem.allowed.around(centre.x, problem.scale)
     if not problem.equalities:
         return near
     here, slopes = _slopes(problem, centre)
     (rows,) = unit_rows(slopes[here.equal])
-    return Surroundings(
+    return LocalFeasibleSet(
         near.rows,
         near.room,
         np.vstack([rows, near.equality_rows]),
@@ -38,7 +38,7 @@ def surroundings(problem: PosedProblem, centre: Evaluation) -> Surroundings:
     )
 
 
-def merit_planes(problem: PosedProblem, evaluation: Evaluation) -> list[Plane]:
+def merit_planes(problem: CheckedProblem, evaluation: Evaluation) -> list[Plane]:
     """Return the planes of J and of the inequalities, these in units of their sizes.
 
     A move along the tangents of equalities is followed by a correction to their surface. Of g·y and the
@@ -68,9 +68,9 @@ def merit_planes(problem: PosedProblem, evaluation: Evaluation) -> list[Plane]:
 
 
 def with_pieces(
-    bundle: Bundle, problem: PosedProblem, evaluation: Evaluation, centre: float, move: Array
+    bundle: Bundle, problem: CheckedProblem, evaluation: Evaluation, centre: float, move: Array
 ) -> Bundle:
-    """Return the bundle with the planes of other functions of which J is the largest, see `Pieced`."""
+    """Return the bundle with the planes of other functions of which J is the largest, see `MaxFunction`."""
     for value, slope in zip(map(float, evaluation.pieces), evaluation.piece_slopes, strict=True):
         plane = merit_planes(problem, replace(evaluation, value=value, subgradient=slope))[0]
         error, length = float(plane.gradient @ move) - (value - centre), float(np.linalg.norm(move))
@@ -78,7 +78,7 @@ def with_pieces(
     return bundle
 
 
-def _slopes(problem: PosedProblem, evaluation: Evaluation) -> tuple[Scaled, Array]:
+def _slopes(problem: CheckedProblem, evaluation: Evaluation) -> tuple[Scaled, Array]:
     """Return the constraints of an evaluation and their gradients in scaled variables, over their sizes."""
     here = problem.constraints_at(evaluation)
     return here, here.factors[:, None] * evaluation.slopes * problem.scale
@@ -99,9 +99,9 @@ def first_soft(
     )
 
 
-def priced_step(
+def penalised_step(
     bundle: Bundle,
-    near: Surroundings,
+    near: LocalFeasibleSet,
     t: float,
     soft: Sequence[SoftConstraint],
     feasibility: float,
@@ -130,7 +130,7 @@ def priced_step(
     stuck = max(violations) > feasibility and sum(possible) > (1.0 - least) * sum(violations)
     while True:
         enough = [
-            _reduced(one, left, best, share, rounding) or one.dearest
+            _reduced(one, left, best, share, rounding) or one.largest_multiplier
             for one, left, best in zip(soft, step.violations, possible, strict=True)
         ]
         if all(enough):
@@ -139,7 +139,9 @@ def priced_step(
         step = solve_step(bundle, near, t, soft)
 
 
-def correcting_step(bundle: Bundle, near: Surroundings, soft: Sequence[SoftConstraint], step: Step) -> Step:
+def correcting_step(
+    bundle: Bundle, near: LocalFeasibleSet, soft: Sequence[SoftConstraint], step: Step
+) -> Step:
     """Return the shortest step to where the planes of the inequalities predict no violation.
 
     Near a minimum what the last small violations cost is lost in the tolerance of the step's programme; this
@@ -162,7 +164,7 @@ def _reduced(one: SoftConstraint, left: float, best: float, share: float, roundi
     return left <= max(one.violation - share * (one.violation - best), best) + rounding
 
 
-def multipliers(problem: PosedProblem, state: MethodState, step: Step) -> Array:
+def multipliers(problem: CheckedProblem, state: MethodState, step: Step) -> Array:
     """Return the multipliers of all nonlinear constraints that a step predicts, units of J by those of c.
 
     Those that carry less than a millionth of the gradient of J are 0.
@@ -183,7 +185,7 @@ def multipliers(problem: PosedProblem, state: MethodState, step: Step) -> Array:
     return np.where(np.abs(found) * lengths > least, found * here.factors, 0.0)
 
 
-def verified(problem: PosedProblem, given: Evaluation, number: int) -> Evaluation:
+def verified(problem: CheckedProblem, given: Evaluation, number: int) -> Evaluation:
     """Return an evaluation whose subgradient is valid, as far as the function knows.
 
     At almost every point a locally Lipschitz function has a gradient, and limits of such gradients at points
@@ -199,7 +201,7 @@ def verified(problem: PosedProblem, given: Evaluation, number: int) -> Evaluatio
     )
 
 
-def with_verified_centre(problem: PosedProblem, state: MethodState) -> MethodState:
+def with_verified_centre(problem: CheckedProblem, state: MethodState) -> MethodState:
     """Return the state with a verified centre, without doubtful planes, careful from now on.
 
     A proximal parameter that wrong predictions have reduced is reset.
@@ -216,7 +218,7 @@ def with_verified_centre(problem: PosedProblem, state: MethodState) -> MethodSta
     return replace(state, centre=centre, bundle=remaining, trust=trust, careful=True, soft=tuple(soft))
 
 
-def neighbour(problem: PosedProblem, x: Array, *, distance: float = 1e-2, attempts: int = 8) -> Array:
+def neighbour(problem: CheckedProblem, x: Array, *, distance: float = 1e-2, attempts: int = 8) -> Array:
     """Return a feasible point near x in a random direction, the same one for the same x.
 
     Steps that leave the box are reflected into it; of several points the one furthest from x is taken, x
@@ -243,7 +245,7 @@ def _distance(point: Array, x: Array, scale: Array) -> float:
 
 
 def restored(
-    problem: PosedProblem, x: Array, number: int, feasibility: float, *, steps: int = 30
+    problem: CheckedProblem, x: Array, number: int, feasibility: float, *, steps: int = 30
 ) -> tuple[Array, Known]:
     """Return the point near x that meets the equalities, bounds and linear constraints, by Newton's method.
 
@@ -280,7 +282,7 @@ def _values(known: Known) -> Array:
     return np.array([one.value for one in known.values()])
 
 
-def _corrected(problem: PosedProblem, x: Array, known: Known, missed: Scaled) -> Array:
+def _corrected(problem: CheckedProblem, x: Array, known: Known, missed: Scaled) -> Array:
     """Return the nearest point, in scaled variables, that meets the linearised equalities."""
     near = problem.allowed.around(x, problem.scale)
     slopes = np.array([one.subgradient for one in known.values()])

@@ -70,7 +70,7 @@ class Remarked(Function, Protocol):
 
 
 @runtime_checkable
-class Pieced(Function, Protocol):
+class MaxFunction(Function, Protocol):
     """A maximum J = max J_k of functions, several of which an evaluation knows, such as of load cases.
 
     The planes of all of them enter the model: fewer evaluations are needed to find where they are equal.
@@ -102,7 +102,7 @@ class Evaluation:
     `asked_value`: allowed error of the value, 0 for an exact function; `turned`: relative change of the
     subgradient since a less accurate evaluation of the same point: 0 for an exact function, inf without such
     an evaluation; `doubtful`: whether it, or one of a constraint, may not be a subgradient, see `Kinked`;
-    `pieces`: values at x of other functions of which J is the largest, see `Pieced`.
+    `pieces`: values at x of other functions of which J is the largest, see `MaxFunction`.
     """
 
     x: Array
@@ -141,10 +141,14 @@ def evaluate(
             turned=float(np.inf),
         )
     evaluation = replace(evaluation, doubtful=isinstance(fun, Kinked) and bool(fun.may_be_invalid(x.copy())))
-    return _with_pieces(fun, evaluation, f"at evaluation {number}") if isinstance(fun, Pieced) else evaluation
+    return (
+        _with_pieces(fun, evaluation, f"at evaluation {number}")
+        if isinstance(fun, MaxFunction)
+        else evaluation
+    )
 
 
-def _with_pieces(fun: Pieced, evaluation: Evaluation, where: str) -> Evaluation:
+def _with_pieces(fun: MaxFunction, evaluation: Evaluation, where: str) -> Evaluation:
     """Return the evaluation with those of other functions of which J is the largest."""
     given = fun.pieces(evaluation.x.copy())
     values, slopes = (np.array(part, dtype=float) for part in given)

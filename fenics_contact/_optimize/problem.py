@@ -43,7 +43,7 @@ def evaluate_constraint(
 
 @displayed
 @dataclass(frozen=True)
-class PosedProblem:
+class CheckedProblem:
     """min J(x) over a feasible set, checked.
 
     `scale`: size of each variable: the method sees x/scale; `length`: length scale of the problem in scaled
@@ -115,7 +115,7 @@ def pose(
     scale: ArrayLike | None = None,
     *,
     restore: bool = False,
-) -> PosedProblem:
+) -> CheckedProblem:
     """Check a problem and choose its scales; the arguments are those of `minimize`, arrays are copied."""
     start = np.array(x0, dtype=float)
     if start.ndim != 1 or start.size == 0:
@@ -138,7 +138,7 @@ def pose(
     start = allowed.clip(start)
     size = _scale(start.size, allowed, scale)
     length = _length(start, allowed, size)
-    return PosedProblem(fun, start, allowed, size, length, named_constraints(curved, start), restore)
+    return CheckedProblem(fun, start, allowed, size, length, named_constraints(curved, start), restore)
 
 
 def _scale(n: int, allowed: FeasibleSet, scale: ArrayLike | None) -> Array:
@@ -162,7 +162,7 @@ def _length(start: Array, allowed: FeasibleSet, scale: Array) -> float:
 
 
 @dataclass(frozen=True)
-class Demand:
+class OracleAccuracy:
     """The errors that a decision tolerates.
 
     A trial is assessed by the difference of two values, a step of length ℓ by a subgradient. Errors of J must
@@ -203,10 +203,10 @@ class Demand:
         return Accuracy(value, min(self.asked.subgradient, self.confirm * centre.asked_subgradient))
 
 
-def demand(worth: float, reach: float, norm: float, shares: tuple[float, float]) -> Demand:
+def demand(worth: float, reach: float, norm: float, shares: tuple[float, float]) -> OracleAccuracy:
     """Return the accuracy that a decision needs."""
     slope = norm * reach
-    return Demand(shares[0] * worth, min(shares[1] * worth / slope if slope > 0.0 else np.inf, 1.0))
+    return OracleAccuracy(shares[0] * worth, min(shares[1] * worth / slope if slope > 0.0 else np.inf, 1.0))
 
 
 def again(centre: Evaluation, evaluation: Evaluation) -> Evaluation:

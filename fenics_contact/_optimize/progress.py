@@ -20,7 +20,7 @@ from fenics_contact._base.display import counted
 from fenics_contact._base.fingerprint import described
 from fenics_contact._base.progress import Task
 from fenics_contact._optimize.objective import Function
-from fenics_contact._optimize.problem import PosedProblem
+from fenics_contact._optimize.problem import CheckedProblem
 from fenics_contact._optimize.result import MethodState, Record
 from fenics_contact.errors import collective
 
@@ -78,7 +78,11 @@ class Progress:
     """Stores a minimisation in its checkpoint, if it has one, and reports its progress."""
 
     def __init__(
-        self, checkpoint: Checkpoint | None, method: Method, problem: PosedProblem, callback: Callback | None
+        self,
+        checkpoint: Checkpoint | None,
+        method: Method,
+        problem: CheckedProblem,
+        callback: Callback | None,
     ) -> None:
         """Describe the problem; nothing is read or written yet."""
         self._checkpoint, self._written = checkpoint, -1
@@ -171,7 +175,7 @@ def _asking(comm: MPI.Comm) -> AbstractContextManager[None]:
     return collective(comm, "the callback of a minimisation", closed=True, users=True)
 
 
-def _fingerprint(method: Method, problem: PosedProblem) -> dict[str, str]:
+def _fingerprint(method: Method, problem: CheckedProblem) -> dict[str, str]:
     options = {
         field.name: getattr(method, field.name) for field in fields(method) if field.name not in LIMITS
     }

@@ -17,7 +17,7 @@ from fenics_contact._optimize.bundle import (
     SubproblemError,
     solve,
 )
-from fenics_contact._optimize.constraints import Surroundings
+from fenics_contact._optimize.constraints import LocalFeasibleSet
 from fenics_contact._optimize.nonlinear import SoftConstraint
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import safe_log
@@ -61,7 +61,7 @@ class Model:
     """What the programme of a step knows of the problem at the centre."""
 
     bundle: Bundle
-    near: Surroundings
+    near: LocalFeasibleSet
     soft: Sequence[SoftConstraint] = ()
 
     def chosen(self, rows: NDArray[np.intp], soft_rows: Sequence[NDArray[np.intp]]) -> Model:
@@ -74,7 +74,7 @@ class Model:
 
 def solve_step(
     bundle: Bundle,
-    near: Surroundings,
+    near: LocalFeasibleSet,
     t: float,
     soft: Sequence[SoftConstraint] = (),
     *,

@@ -58,7 +58,7 @@ from fenics_contact.shapes.simple import evaluate_shape
 if TYPE_CHECKING:
     from fenics_contact._pairing.mortar.coupling import MortarCoupling
     from fenics_contact._pairing.mortar.derivatives import SurfaceDerivatives
-    from fenics_contact._pairing.mortar.gathering import Gathering
+    from fenics_contact._pairing.mortar.gathering import CondensedDualBasis
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ class MortarPoints:
     slave: FacetedSurface
     master: FacetedSurface
     coupling: MortarCoupling
-    gathering: Gathering | None
+    gathering: CondensedDualBasis | None
     closable: ClosableGaps | None
 
     @classmethod
@@ -250,11 +250,11 @@ class MortarPoints:
         """
         from fenics_contact._pairing.mortar.by_master import with_inclined
         from fenics_contact._pairing.mortar.coupling import mortar_coupling
-        from fenics_contact._pairing.mortar.gathering import Gathering
+        from fenics_contact._pairing.mortar.gathering import CondensedDualBasis
 
         comm = comm or MPI.COMM_SELF
         slave, coupling = with_inclined(slave, master, mortar_coupling(slave, master, comm))
-        gathering = Gathering.of(coupling, slave, bearing if movable is None else movable)
+        gathering = CondensedDualBasis.of(coupling, slave, bearing if movable is None else movable)
         if gathering is not None:
             coupling = gathering.coupling(slave, master)
         chosen = np.flatnonzero(bearing[coupling.node])
@@ -394,7 +394,7 @@ def _points_of_pairs(
     fixed, axes = supported
     parts = []
     for index, pair in enumerate(pairs):
-        if isinstance(pair, ContactPair) and pair.within_body:
+        if isinstance(pair, ContactPair) and pair.is_self_contact:
             continue  # no part of an undeformed body is near another one
         points = _measured(scene, pair, index, supported, comm, finer, advice)
         if isinstance(pair, ContactPair) and pair.given_gap:

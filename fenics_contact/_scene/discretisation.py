@@ -73,7 +73,7 @@ def _with_better_slave(scene: SceneParts, pair: Pair) -> Pair:
     """Return a pair, exchanged where its master touches first with a corner, if it may be."""
     if not isinstance(pair, ContactPair) or not isinstance(pair.master, Surface):
         return pair
-    if pair.within_body or pair.depends_on_slave:
+    if pair.is_self_contact or pair.depends_on_slave:
         return pair
     better = with_corner_as_slave(scene, pair)
     if better is pair or better.place in [each.place for each in scene.contacts]:
@@ -94,7 +94,7 @@ def _choice(scene: SceneParts, pair: ContactPair | AnyTie) -> tuple[Discretisati
     """Return the better discretisation of a pair, and why."""
     if not isinstance(pair.master, Surface):
         return "node", RIGID
-    if isinstance(pair, ContactPair) and pair.within_body:
+    if isinstance(pair, ContactPair) and pair.is_self_contact:
         return "node", "as the body meets itself"
     if isinstance(pair, ContactPair) and pair.nodes is not None:
         return "node", f"as the nodes of {pair.nodes!r} touch"

@@ -17,7 +17,7 @@ from fenics_contact._base.checks import LARGEST, checked, naming_arguments, requ
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -308,7 +308,7 @@ def read_field(
     Note:
         Collective on ``comm`` if given.
     """
-    return SampledField(*made_once(comm, lambda: _read(Path(path), field)), reach)
+    return SampledField(*on_root_then_bcast(comm, lambda: _read(Path(path), field)), reach)
 
 
 def _read(path: Path, field: str | Sequence[str] | None) -> tuple[np.ndarray, np.ndarray]:

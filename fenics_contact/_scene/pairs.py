@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import Table, in_notebooks, in_short, name_in_words, tabled
+from fenics_contact._base.late_names import warn_of_old_name
 from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.fluid import FluidPressure
@@ -209,8 +210,8 @@ class ContactPair(Chosen, Part):
             _check_length(f"ContactPair.{name}", getattr(self, name))
         if self.closure is not None:
             check_closing(self.closure)
-        if self.nodes is not None and (self.discretisation == "mortar" or self.within_body):
-            given = "a body that meets itself" if self.within_body else "discretisation='mortar'"
+        if self.nodes is not None and (self.discretisation == "mortar" or self.is_self_contact):
+            given = "a body that meets itself" if self.is_self_contact else "discretisation='mortar'"
             raise InvalidInputError(
                 f"contact of the nodes of {self.nodes!r} alone is by nodes and between two bodies, got "
                 f"{given}: leave the nodes out, or give no discretisation and a master of another body"
@@ -219,7 +220,7 @@ class ContactPair(Chosen, Part):
     def check(self, scene: Around) -> None:
         """Reject surfaces that are not there, and what does not suit the bodies."""
         require_surface(scene, self.slave.body, self.slave.name, "ContactPair.slave")
-        if self.within_body:
+        if self.is_self_contact:
             self._require_deforming(scene)
         if self.fluid is not None:
             self.fluid.check(scene, self.slave.body, self.place)
@@ -262,9 +263,15 @@ class ContactPair(Chosen, Part):
             )
 
     @property
-    def within_body(self) -> bool:
+    def is_self_contact(self) -> bool:
         """Whether a body meets itself, which needs large deformations."""
         return isinstance(self.master, Surface) and self.master.body == self.slave.body
+
+    @property
+    def within_body(self) -> bool:
+        """The old name of `is_self_contact`, until 0.4."""
+        warn_of_old_name("ContactPair.within_body", "is_self_contact")
+        return self.is_self_contact
 
     @property
     def slave_geometry(self) -> Geometry:

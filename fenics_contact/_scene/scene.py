@@ -177,7 +177,7 @@ class LoadStep:
         supports: All supports with their values at the end of the step, a function that returns them at a
             time, or None. They may hold other components than before: what is released carries nothing at the
             end of the step, what is held newly has its value there, measured from the undeformed body, or
-            keeps what it has, see `Kept`.
+            keeps what it has, see `HoldCurrent`.
         time: Time at the end of the step in any unit, for records, functions of time, obstacles that move
             and materials that creep; None: the number of the step, from 1.
         preloads: The bolts that are drawn together in the step, by a force or a length; all others of the

@@ -23,14 +23,14 @@ Component = float | OfPosition | None
 
 
 @dataclass(frozen=True)
-class Kept:
+class HoldCurrent:
     """What a support of a load step holds where it is when the step begins.
 
     Give it as a component of `Support.value`, or as `Roller.displacement`: each node keeps the displacement
     that it has. In a scene without a load step before it is zero.
 
     Example:
-        >>> frozen = Support("bar", "x1", (Kept(), None, None))
+        >>> frozen = Support("bar", "x1", (HoldCurrent(), None, None))
     """
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
@@ -49,7 +49,8 @@ class Support(Part):
         value: Displacement [length] for x, y, z (for x, y on a plane body), by default zero in all directions
             of the body's space. Of bodies of revolution with torsion it is along the radius, the axis and the
             way around it. None leaves a component free; a function receives points, shape (n, dim), and
-            returns the component there, shape (n,). `Kept` keeps what each node has when a load step begins.
+            returns the component there, shape (n,). `HoldCurrent` keeps what each node has at the
+            start of a load step.
 
     Raises:
         InvalidInputError: If nothing is prescribed, or something other than a finite number or a function.
@@ -129,7 +130,7 @@ class Roller(Part):
         surface: Name of its surface; with a direction also of a node set of its mesh.
         displacement: Displacement along the direction, along the normal positive outwards, [length]: a
             number, zero by default, or a function that receives points, shape (n, dim), and returns it there,
-            shape (n,); `Kept` as for `Support`.
+            shape (n,); `HoldCurrent` as for `Support`.
         direction: The direction, of any length, or a function that receives points, shape (n, dim), and
             returns the directions there, shape (n, dim), as the radial one of a cylinder; the outward normal
             at every node by default.

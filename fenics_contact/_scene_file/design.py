@@ -67,7 +67,7 @@ _ALONE = (
     table_of(objectives_module.StrainEnergy, ObjectivePart, kind="strain_energy"),
     table_of(objectives_module.LargestPressure, ObjectivePart, kind="largest_pressure"),
     table_of(objectives_module.PressureNorm, ObjectivePart, kind="pressure_norm"),
-    table_of(objectives_module.PressureUnevenness, ObjectivePart, kind="pressure_unevenness"),
+    table_of(objectives_module.PressureNonuniformity, ObjectivePart, kind="pressure_unevenness"),
     table_of(objectives_module.ContactArea, ObjectivePart, kind="contact_area"),
     table_of(objectives_module.FrictionWork, ObjectivePart, kind="friction_work"),
 )

@@ -63,7 +63,7 @@ from fenics_contact.design.problem import ShapeProblem
 from fenics_contact.design.several import LoadPath
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.kinds import scene_file_code
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.materials.elastic import Material
 from fenics_contact.results.state import State
 
@@ -644,7 +644,7 @@ def _source(scene: str | Path | Mapping[str, Any], comm: MPI.Comm) -> Source:
             "of them"
         )
     path = Path(scene)
-    return parse(made_once(comm, lambda: _text_of(path)), path.name, path.parent)
+    return parse(on_root_then_bcast(comm, lambda: _text_of(path)), path.name, path.parent)
 
 
 def _text_of(path: Path) -> str:

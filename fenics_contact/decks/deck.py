@@ -24,7 +24,7 @@ from fenics_contact.decks.supports import SupportBuilder
 from fenics_contact.decks.tables import Print, PrintTable
 from fenics_contact.decks.vocabulary import PROCEDURES, refuse_unknown
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.readers.deck_assembly import read_cards
 from fenics_contact.readers.deck_cards import NO_INSTANCES, Card, DeckError, Instances, Origin
 from fenics_contact.readers.deck_mesh import MeshCards
@@ -214,7 +214,7 @@ def read_deck(path: str | Path, comm: MPI.Comm | None = None, *, statics_only: b
         >>> deck = read_deck("bracket.inp")  # doctest: +SKIP
         >>> states = deck.solve(MPI.COMM_WORLD)  # doctest: +SKIP
     """
-    return made_once(comm, lambda: _read(Path(path), statics_only))
+    return on_root_then_bcast(comm, lambda: _read(Path(path), statics_only))
 
 
 def _read(path: Path, statics_only: bool = False) -> Deck:

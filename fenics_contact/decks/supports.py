@@ -13,7 +13,7 @@ from fenics_contact._scene.constraints import ConstraintTerm, LinearConstraint
 from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.preloads import Section as CutAt
-from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Roller, Support
+from fenics_contact._scene.supports import AnySupport, HoldCurrent, RigidSurface, Roller, Support
 from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.couplings import Bolt, Driven, rigid_surface
 from fenics_contact.decks.rigid_links import by_small_turns, following, in_their_space, spread_out
@@ -74,14 +74,14 @@ class SupportBuilder:
             found.append(Roller(body, name, amount, direction))
         return found
 
-    def _kept(self, name: str, kept: np.ndarray) -> Kept:
+    def _kept(self, name: str, kept: np.ndarray) -> HoldCurrent:
         """Return a support that keeps what all of its nodes have."""
         if not kept.all():
             target = next(each for each in self.built.steps.targets if each.fixed)
             raise target.card.error(
                 f"nodes of {name!r} that are FIXED were partly free before: make two sets of them", target.row
             )
-        return Kept()
+        return HoldCurrent()
 
     def _always_zero(self, nodes: np.ndarray, held: Sequence[int]) -> bool:
         """Return whether components of nodes are held at zero in all steps."""

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from fenics_contact._optimize.constraints import LinearConstraints, nearest_feasible
     from fenics_contact._optimize.manufacture import convex, fixed_rim, monotone, smallest_radius, symmetric
     from fenics_contact._optimize.nonlinear import NonlinearConstraint
-    from fenics_contact._optimize.objective import Kinked, Pieced
+    from fenics_contact._optimize.objective import Kinked, MaxFunction
     from fenics_contact._optimize.result import NotConvergedError, Result
     from fenics_contact._optimize.scipy import ForScipy
     from fenics_contact.design.adjoint import Adjoint, WeakChoice
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
         LargestPressure,
         LargestStress,
         Movement,
+        PressureNonuniformity,
         PressureNorm,
-        PressureUnevenness,
         StrainEnergy,
         TotalPotential,
     )
@@ -49,6 +49,7 @@ __all__ = [
     "LinearConstraints",
     "LoadCases",
     "LoadPath",
+    "MaxFunction",
     "Maximum",
     "MovedSurface",
     "Movement",
@@ -58,9 +59,8 @@ __all__ = [
     "Objective",
     "Partials",
     "PeakPressure",
-    "Pieced",
+    "PressureNonuniformity",
     "PressureNorm",
-    "PressureUnevenness",
     "Remeshed",
     "Result",
     "StrainEnergy",
@@ -77,4 +77,6 @@ __all__ = [
     "symmetric",
 ]
 
-__getattr__, __dir__ = late_names(__name__)
+__getattr__, __dir__ = late_names(
+    __name__, renamed={"PressureUnevenness": "PressureNonuniformity", "Pieced": "MaxFunction"}
+)

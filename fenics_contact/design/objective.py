@@ -74,7 +74,7 @@ class Objective(Protocol):
         """Evaluate J and its partial derivatives. Collective."""
 
 
-def asking(comm: MPI.Comm) -> AbstractContextManager[None]:
+def guarded_user_call(comm: MPI.Comm) -> AbstractContextManager[None]:
     """Guard a block that evaluates an objective, which may be user code. Collective on ``comm``."""
     return collective(comm, "the objective", closed=True, users=True)
 

@@ -330,7 +330,7 @@ def require_exponent(what: str, p: float) -> None:
 
 @dataclass(frozen=True)
 @checked()
-class PressureUnevenness(OfPressures):
+class PressureNonuniformity(OfPressures):
     """J = Σ A_i (p_i − m)² / (m² Σ A_i), m = Σ A_i p_i / Σ A_i: zero where the pressure is even, no unit.
 
     It is the square of the relative standard deviation over the whole slave surface. Open points count with
@@ -356,7 +356,7 @@ class ContactArea(OfPressures):
     `contact_area` locates the rim between nodes; its derivative is infinite where nodes open. Here
     the pressures of all nodes are differentiated and their areas, not the place of the rim.
 
-    To enlarge it, minimise ``-ContactArea()`` or `PressureUnevenness`.
+    To enlarge it, minimise ``-ContactArea()`` or `PressureNonuniformity`.
     """
 
     can_be_infinite = False

@@ -22,7 +22,14 @@ from fenics_contact.design.base import SingleProblem, comm_of, with_fewest_weak_
 from fenics_contact.design.design import SurfaceDesign
 from fenics_contact.design.memory import AdaptiveTolerance, DesignMemory, DesignPoint, Stored, tightest_of
 from fenics_contact.design.motion import DesignGeometry
-from fenics_contact.design.objective import Objective, Partials, asking, finite, finite_partials, finite_value
+from fenics_contact.design.objective import (
+    Objective,
+    Partials,
+    finite,
+    finite_partials,
+    finite_value,
+    guarded_user_call,
+)
 from fenics_contact.design.sensitivity import adjoint_of, by_nodes, products_of
 from fenics_contact.errors import (
     ConvergenceError,
@@ -353,7 +360,7 @@ class ShapeProblem(SingleProblem):
     def value_of(self, alpha: np.ndarray) -> float:
         """Return J(α) alone, without adjoint. Collective."""
         state = self.state_of(alpha)
-        with asking(self.comm):
+        with guarded_user_call(self.comm):
             return finite_value(self.objective.value(state, self.geometry.forms))
 
     @collectively("ShapeProblem.evaluate", comm_of)
@@ -386,7 +393,7 @@ class ShapeProblem(SingleProblem):
 
     def partials_of(self, objective: Objective, state: AnyState) -> Partials:
         """Return an objective and its partial derivatives at a state, checked. Collective."""
-        with self._timer.phase("objective"), asking(self.comm):
+        with self._timer.phase("objective"), guarded_user_call(self.comm):
             return finite_partials(objective.partials(state, self.geometry.forms))
 
     def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:

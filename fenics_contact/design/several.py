@@ -17,7 +17,7 @@ from fenics_contact.design.adjoint import WeakPoints, by_slip_origin, with_later
 from fenics_contact.design.base import DesignProblem, comm_of, with_fewest_weak_points
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.memory import DesignPoint, JointPoint, record_of_values
-from fenics_contact.design.objective import Objective, Partials, asking, finite_value
+from fenics_contact.design.objective import Objective, Partials, finite_value, guarded_user_call
 from fenics_contact.design.problem import ShapeProblem
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.results.deformed_state import AnyState
@@ -307,7 +307,7 @@ class LoadPath(JointProblem):
     def values_of(self, alpha: np.ndarray) -> dict[str, float]:
         """Return J_n(α) of every step that has an objective. Collective."""
         states, forms = self._states.of(alpha), self.forms
-        with asking(self.comm):
+        with guarded_user_call(self.comm):
             given = {name: each.value(states[name], forms) for name, each in self.objectives.items()}
             return {name: finite_value(value) for name, value in given.items()}
 

@@ -288,7 +288,7 @@ def together(comm: MPI.Comm, where: str = "") -> Iterator[None]:
     agree(comm, error, where)
 
 
-def made_once(comm: MPI.Comm | None, make: Callable[[], Found]) -> Found:
+def on_root_then_bcast(comm: MPI.Comm | None, make: Callable[[], Found]) -> Found:
     """Return what a function makes on rank 0, on all ranks; without a communicator what it makes here.
 
     Collective on ``comm`` if given; ``make`` must not use it.

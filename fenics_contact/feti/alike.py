@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from fenics_contact.feti.nearby import Nearby
+from fenics_contact.feti.nearby import ToleranceIndex
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain
 
 
@@ -162,7 +162,9 @@ class Kinds:
         self._agreement = agreement or Agreement()
         self.all: list[Kind] = []
         # By counts and trace: kind, a subdomain of it with a numbering of its own, how it lies on the first.
-        self._seen: dict[tuple[int, ...], Nearby[tuple[Kind, Kind, Motion | None]]] = defaultdict(Nearby)
+        self._seen: dict[tuple[int, ...], ToleranceIndex[tuple[Kind, Kind, Motion | None]]] = defaultdict(
+            ToleranceIndex
+        )
         self._matrices: set[int] = set()
 
     def add(self, kind: Kind) -> Kind:

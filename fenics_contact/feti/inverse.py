@@ -20,7 +20,7 @@ from fenics_contact.feti.alike import Kind, Kinds, Motion
 from fenics_contact.feti.compact import CompactOperator, Insides
 from fenics_contact.feti.condensation import Condensations, pieces, regular_factor
 from fenics_contact.feti.factor import Factor, regularised
-from fenics_contact.feti.moved import Batch, MovedInterface, MovedOperator, SharedOperator
+from fenics_contact.feti.moved import Batch, CongruentOperator, MovedInterface, SharedOperator
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_dofs
 
 
@@ -415,7 +415,7 @@ class TornInverse:
         for (kind, motion), local, part in zip(self._members, self._local, self._parts, strict=True):
             operator, moved = factored(kind), None
             if motion is not None:
-                operator = MovedOperator(operator, motion, local, kind.interface)
+                operator = CongruentOperator(operator, motion, local, kind.interface)
                 moved = operator.interface
             self.operators.append(operator)
             groups.setdefault(kind, []).append((operator, part, moved))
@@ -511,7 +511,7 @@ class TornInverse:
             touched = np.flatnonzero(np.diff(block.indptr))
             if len(touched):
                 block = block[touched]
-                block = operator.rows_there(block) if isinstance(operator, MovedOperator) else block
+                block = operator.rows_there(block) if isinstance(operator, CongruentOperator) else block
                 found.setdefault(kind, []).append((touched, block))
         for kind, blocks in found.items():
             touched, every = np.concatenate([each for each, _ in blocks]), sp.vstack([b for _, b in blocks])

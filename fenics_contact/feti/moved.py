@@ -45,7 +45,7 @@ class MovedInterface:
         return (sp.kron(sp.identity(count // len(self.turn)), self.turn) @ T).tocsr()
 
 
-class MovedOperator:
+class CongruentOperator:
     """The operator of the first subdomain of a kind for another one of it, P⁻¹ (...) P."""
 
     def __init__(

@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 Item = TypeVar("Item")
 
 
-class Nearby(Generic[Item]):
+class ToleranceIndex(Generic[Item]):
     """Items that are found by a number close to theirs, in the order in which they were added."""
 
     def __init__(self) -> None:

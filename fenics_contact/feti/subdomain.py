@@ -34,7 +34,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.following import AnyFollowing, Following
 from fenics_contact.feti.foundations import foundation_stiffness, separated
-from fenics_contact.feti.nearby import Nearby
+from fenics_contact.feti.nearby import ToleranceIndex
 from fenics_contact.materials.elastic import Material
 from fenics_contact.mesh.collapsed import expanded
 from fenics_contact.mesh.faces import coordinate_rounding, corners_of, match_faces
@@ -243,7 +243,7 @@ class Assembled:
     def __init__(self) -> None:
         """Start empty."""
         # By space: subdomains with cells connected and numbered alike share one.
-        self._known: dict[int, Nearby[Subdomain]] = defaultdict(Nearby)
+        self._known: dict[int, ToleranceIndex[Subdomain]] = defaultdict(ToleranceIndex)
 
     def add(self, subdomain: Subdomain) -> None:
         """Add a subdomain whose matrix depends on cells, numbering, materials and shape alone."""

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from fenics_contact.qp.compliance import Compliance
 
 
-def meeting_points(
+def contact_and_tied_points(
     scene: Scene, decomposition: Decomposition, *, overlap: bool, advice: Advice = SILENCE
 ) -> tuple[ContactPoints, ContactPoints]:
     """Search for contact and tied points, only where the scene has pairs. Collective."""
@@ -508,7 +508,7 @@ def _found(
     """Search for contact, and return all groups of rows. Collective."""
     known = previous is not None and previous.scene.has_surfaces_of(scene)
     advice = SILENCE if known else ADVICE
-    points, ties = meeting_points(scene, decomposition, overlap=overlap, advice=advice)
+    points, ties = contact_and_tied_points(scene, decomposition, overlap=overlap, advice=advice)
     found = _joints(scene, decomposition, ties, () if previous is None else previous.groups.joints)
     with together(decomposition.comm):
         left = ties

@@ -209,7 +209,7 @@ def _placed(
 ) -> np.ndarray:
     """Return coordinates: new nodes and those that hang no more lie on the shapes of their surfaces.
 
-    Others around them follow, see `drawn_along`; nodes that hang lie at the mean of their masters.
+    Others around them follow, see `smoothed_along`; nodes that hang lie at the mean of their masters.
 
     `numbers`: all nodes of the halved cells, and the refined cells.
     """

@@ -8,9 +8,9 @@ import numpy as np
 
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
-from fenics_contact.mesh.drawn_along import drawn_along
 from fenics_contact.mesh.faces import boundary_faces, match_faces, vector_areas
 from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
+from fenics_contact.mesh.smoothed_along import smoothed_along
 from fenics_contact.shapes.combined import Joined
 from fenics_contact.shapes.simple import ROUNDING, STEPS, Plane, SurfaceShape, closest_points, evaluate_shape
 
@@ -33,7 +33,7 @@ def on_shapes(
         return moved
     pieces = cell_type_of(cells, straight.shape[1]).pieces
     linear = cells[:, pieces].reshape(-1, pieces.shape[1])
-    found = straight + drawn_along(moved - straight, new & ~placed, straight, linear, along, hanging)
+    found = straight + smoothed_along(moved - straight, new & ~placed, straight, linear, along, hanging)
     return hanging.placed(found)
 
 

@@ -23,7 +23,7 @@ from fenics_contact._base.checks import (
 from fenics_contact._base.display import displayed
 from fenics_contact._base.progress import Task
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.readers.bodies import Label
 from fenics_contact.readers.cad_shapes import shape_seen
@@ -323,7 +323,7 @@ def read_cad(
         surface "hole", whose shape is a `Cylinder`. With ``sizes={"hole": 0.5}`` cells along the hole have
         0.5 mm.
     """
-    return made_once(comm, lambda: _read(Path(path), size, sizes or {}, order, bodies, surfaces))
+    return on_root_then_bcast(comm, lambda: _read(Path(path), size, sizes or {}, order, bodies, surfaces))
 
 
 def _read(

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.checks import naming_arguments, require_file
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.quadratic_nodes import with_centres
 from fenics_contact.mesh.quality import AT_GAUSS_POINTS, jacobians, thickness
@@ -423,7 +423,7 @@ def read_deck_mesh(path: str | Path, comm: MPI.Comm | None = None) -> dict[str, 
     Note:
         Collective on ``comm`` if given.
     """
-    return made_once(comm, lambda: _read(Path(path)))
+    return on_root_then_bcast(comm, lambda: _read(Path(path)))
 
 
 def _read(path: Path) -> dict[str, BodyMesh]:

@@ -18,7 +18,7 @@ from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import start
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, OF_THE_FILE
 from fenics_contact.mesh.plane import flattened, turned_right_handed
@@ -347,7 +347,7 @@ def read_xdmf(
     facets = Path(path if facet_file is None else facet_file)
     if comm is not None:
         start(comm)  # dolfinx starts PETSc, on one rank it would wait for the others
-    return bodies_of(made_once(comm, lambda: _read(Path(path), facets, names)), bodies, surfaces)
+    return bodies_of(on_root_then_bcast(comm, lambda: _read(Path(path), facets, names)), bodies, surfaces)
 
 
 @naming_arguments

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact._base.progress import Task
 from fenics_contact.errors import FenicsContactError, InvalidInputError
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.readers.bodies import TaggedMesh, bodies_of
@@ -80,7 +80,7 @@ def read_msh(
     Note:
         Collective on ``comm`` if given.
     """
-    return bodies_of(made_once(comm, lambda: _read(Path(path))), bodies, surfaces)
+    return bodies_of(on_root_then_bcast(comm, lambda: _read(Path(path))), bodies, surfaces)
 
 
 def from_gmsh_model(

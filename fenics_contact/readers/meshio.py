@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import shape_of
 from fenics_contact.mesh.plane import flattened, turned_right_handed
@@ -443,7 +443,7 @@ def read_mesh(
     if other is not None:
         return other(path, bodies, surfaces, comm=comm)
     how = partial(_tagged, labels=labels, corners_only=corners_only, everything=bodies is None)
-    return bodies_of(made_once(comm, lambda: _read(path, how, file_format)), bodies, surfaces)
+    return bodies_of(on_root_then_bcast(comm, lambda: _read(path, how, file_format)), bodies, surfaces)
 
 
 @naming_arguments

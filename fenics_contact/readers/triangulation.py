@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.ranks import made_once
+from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.readers.meshio import read_with_meshio
 from fenics_contact.shapes.triangulation import Triangulation
 
@@ -48,7 +48,7 @@ def read_triangulation(
     """
     if not (np.isfinite(scale) and scale > 0):
         raise InvalidInputError(f"scale must be a positive number, got {scale!r}: 1000 turns m into mm")
-    return made_once(comm, lambda: _read(Path(path), scale, smooth, file_format))
+    return on_root_then_bcast(comm, lambda: _read(Path(path), scale, smooth, file_format))
 
 
 def _read(path: Path, scale: float, smooth: float, file_format: str | None) -> Triangulation:

@@ -184,10 +184,10 @@ class FacetsOutside:
 
 
 #: What is uncertain about the largest pressure of a pair.
-PeakDoubt = CoarsePeak | BetweenNodes | UnmatchedNodes | FacetsOutside
+PeakUncertainty = CoarsePeak | BetweenNodes | UnmatchedNodes | FacetsOutside
 
 
-def in_words(doubts: Sequence[PeakDoubt]) -> str:
+def in_words(doubts: Sequence[PeakUncertainty]) -> str:
     """Return the first of some doubts in one line, and how many pairs have others."""
     words = str(doubts[0])
     others = {each.place for each in doubts[1:]} - {doubts[0].place}

@@ -52,7 +52,7 @@ from fenics_contact.results.forces import (
     support_reactions,
 )
 from fenics_contact.results.preloads import Preloads
-from fenics_contact.results.resolution import PeakDoubt, in_words
+from fenics_contact.results.resolution import PeakUncertainty, in_words
 from fenics_contact.results.rigid_motions import RigidMotion, UnheldMotion, rigid_motion
 from fenics_contact.results.springs import SpringForces
 from fenics_contact.results.tools import ToolResult, tool_results
@@ -214,8 +214,8 @@ class State(ABC):
             iterated.
         known_errors: Errors estimated so far, by a balanced solve or by `LinearState.estimate_errors`; None
             before, and where materials are nonlinear.
-        peak_doubts: What meshes leave uncertain about the largest pressure of pairs; where materials are
-            nonlinear, without what nodes that do not match make of it.
+        peak_uncertainties: What meshes leave uncertain about the largest pressure of pairs; where materials
+            are nonlinear, without what nodes that do not match make of it.
 
     Example:
         >>> state = solve_scene(scene, comm)  # doctest: +SKIP
@@ -231,7 +231,7 @@ class State(ABC):
     seconds: Mapping[str, float]
     tolerance: Tolerance = None
     known_errors: StateErrors | None = field(default=None, repr=False)
-    peak_doubts: tuple[PeakDoubt, ...] = field(default=(), repr=False)
+    peak_uncertainties: tuple[PeakUncertainty, ...] = field(default=(), repr=False)
     missed: dict[int, object] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
@@ -255,7 +255,7 @@ class State(ABC):
             "residuals": f"natural {solution.natural_residual:.1e}, gluing {solution.gluing_residual:.1e}",
             "seconds": ", ".join(f"{name} {spent:.2f}" for name, spent in self.seconds.items()),
             **self._errors_in_words(),
-            **({"peak pressure": in_words(self.peak_doubts)} if self.peak_doubts else {}),
+            **({"peak pressure": in_words(self.peak_uncertainties)} if self.peak_uncertainties else {}),
             **shown,
         }
 

@@ -33,7 +33,7 @@ from fenics_contact import (
     theory,
 )
 from fenics_contact._adaptive.goal_errors import value_of
-from fenics_contact._adaptive.levels import Way
+from fenics_contact._adaptive.levels import AdaptiveLoop
 from fenics_contact._adaptive.resultants import StickArea
 from fenics_contact._base.memory import available_memory
 from fenics_contact._base.progress import Kind
@@ -134,7 +134,7 @@ def test_less_than_three_meshes_tell_nothing_of_errors():
 
 def error_after(corrected, sums, state_value, missing, *, without_adjoint=""):
     """The error of a value with its estimate, on the last of some meshes."""
-    way = Way(TotalPotential(), 0.01, Limits(), MPI.COMM_SELF)
+    way = AdaptiveLoop(TotalPotential(), 0.01, Limits(), MPI.COMM_SELF)
     way.without_adjoint, way._sums = without_adjoint, sums
     way._corrected = [*corrected, state_value + missing]
     return way._error(missing, state_value + missing)
@@ -185,7 +185,7 @@ def test_an_error_above_the_value_is_unknown():
 @pytest.mark.parametrize(("missing", "value"), [(-4.0, 6.0), (-15.0, 10.0), (15.0, 10.0)])
 def test_an_estimate_above_the_quantity_corrects_nothing(monkeypatch, peak, missing, value):
     """A pressure of 10 that is to be corrected by −15 would become one that pulls."""
-    way = Way(PeakPressure(), 0.01, Limits(), MPI.COMM_SELF)
+    way = AdaptiveLoop(PeakPressure(), 0.01, Limits(), MPI.COMM_SELF)
     way._state, way._doubted = peak.state, False
     way._sums, way._corrected = [9.0, 3.0], [6.0, 6.0]
     found = SimpleNamespace(value=10.0, known=missing, without_adjoint="", by_cell=lambda body: np.ones(1))
@@ -389,7 +389,7 @@ def test_only_pressures_and_stresses_grow_without_limit():
         (StrainEnergy() + 2.0 * TotalPotential(), False),
         (Movement("block", "y1", (0.0, 1.0)), False),
     ):
-        way = Way(quantity_, 0.01, Limits(), MPI.COMM_SELF)
+        way = AdaptiveLoop(quantity_, 0.01, Limits(), MPI.COMM_SELF)
         way.levels, way._corrected = levels, [each.value for each in levels]
         way._state = SimpleNamespace(scene=pressed())
         assert ("grows without limit" in way._singular()) == infinite, quantity_

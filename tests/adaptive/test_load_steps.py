@@ -16,7 +16,6 @@ from mpi4py import MPI
 from fenics_contact import (
     AccurateResult,
     Body,
-    CarriedState,
     ContactProblem,
     Coulomb,
     DeformedState,
@@ -30,6 +29,7 @@ from fenics_contact import (
     SlipTable,
     State,
     Support,
+    TransferredState,
     gallery,
     quantity,
     solve_steps,
@@ -112,7 +112,7 @@ def test_uniform_plastic_strain_is_carried_exactly(material: J2Plasticity, size:
         return ContactProblem(scene, SELF, tolerance=1e-13)
 
     before = stretched(old[-1].mesh, size).solve()
-    carried = CarriedState(before, {"bar": MeshTransfer(old, new)})
+    carried = TransferredState(before, {"bar": MeshTransfer(old, new)})
     problem = stretched(new[-1].mesh, size)
     same = problem.solve(before=problem.solve())
     held = stretched(new[-1].mesh, size).solve(before=carried)
@@ -168,7 +168,7 @@ def test_on_the_same_meshes_nothing_changes(name: str, plastic: bool) -> None:
     after = half_as_much(fine.scene)
     one, other, fresh = (
         ContactProblem(after, SELF, partitions=cut(after, parts), tolerance=1e-9).solve(before=each)
-        for each, parts in ((before, 3), (CarriedState(before, ways), 5), (None, 3))
+        for each, parts in ((before, 3), (TransferredState(before, ways), 5), (None, 3))
     )
     for body in after.bodies:
         u, v = (state.gather_displacement(body) for state in (one, other))
@@ -192,7 +192,7 @@ def test_a_plastic_block_is_refined_between_two_load_steps(plastic: Sequence[Sta
     mesh = scene.bodies["block"].mesh
     finer = refined(mesh, np.arange(mesh.n_cells))
     fine = replace(scene, bodies={"block": replace(scene.bodies["block"], mesh=finer.mesh)})
-    carried = CarriedState(before, {"block": MeshTransfer(new=[finer])})
+    carried = TransferredState(before, {"block": MeshTransfer(new=[finer])})
     after = ContactProblem(steps[1].applied_to(fine), SELF).solve(
         before=carried, step=replace(steps[1], time=2.0)
     )
@@ -250,7 +250,7 @@ def test_histories_that_are_not_carried_are_refused() -> None:
     for what, each in cases.items():
         known = cast("State", SimpleNamespace(scene=each))
         with pytest.raises(InvalidInputError, match=f"are carried there, that of {what} is not"):
-            CarriedState(known, {}).check(each)
+            TransferredState(known, {}).check(each)
 
 
 def test_transfers_lead_from_the_meshes_of_the_state_to_those_of_the_scene() -> None:
@@ -262,14 +262,14 @@ def test_transfers_lead_from_the_meshes_of_the_state_to_those_of_the_scene() -> 
     words = r"must lead from the meshes of its state to those of the scene, got others, of \[{}\]: give"
     for ways, named in (({}, ""), ({"block": MeshTransfer([finer])}, "'block'")):
         with pytest.raises(InvalidInputError, match=words.format(re.escape(named))):
-            ContactProblem(first.applied_to(fine), SELF).solve(before=CarriedState(state, ways))
+            ContactProblem(first.applied_to(fine), SELF).solve(before=TransferredState(state, ways))
 
 
 RANKS = """
 import numpy as np
 from dataclasses import replace
 from mpi4py import MPI
-from fenics_contact import CarriedState, ContactProblem, Limits, solve_steps_to
+from fenics_contact import TransferredState, ContactProblem, Limits, solve_steps_to
 from fenics_contact.mesh import MeshTransfer, refined
 from tests.adaptive.rolling import block, forces, pressed, rolled, upwards
 comm = MPI.COMM_WORLD
@@ -280,7 +280,7 @@ metal, (down, along) = pressed(2)
 before = ContactProblem(down.applied_to(metal), comm).solve()
 finer = refined(metal.bodies["block"].mesh, [0, 3])
 body = replace(metal.bodies["block"], mesh=finer.mesh)
-carried = CarriedState(before, {"block": MeshTransfer(new=[finer])})
+carried = TransferredState(before, {"block": MeshTransfer(new=[finer])})
 state = ContactProblem(along.applied_to(replace(metal, bodies={"block": body})), comm).solve(before=carried)
 values.append((finer.mesh.n_cells, *forces(state)))
 if comm.rank == 0:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Kept, Support
+from fenics_contact import HoldCurrent, Support
 from fenics_contact.__main__ import main
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block
@@ -36,7 +36,7 @@ def test_supports_are_released_and_kept_from_step_to_step(tmp_path: Path) -> Non
     assert holding == [there, free, there, there, free]
     for number in (2, 3):
         ends = [s for s in found.steps[number].supports or () if s.surface == "BAR_X1"]
-        assert ends == [Support("BAR", "BAR_X1", (Kept(), None, None))]
+        assert ends == [Support("BAR", "BAR_X1", (HoldCurrent(), None, None))]
     states = found.solve(MPI.COMM_SELF, tolerance=1e-11)
     mesh = found.scene.bodies["BAR"].mesh
     tip, stretch = mesh.points[:, 0] == LENGTH, STRESS * LENGTH / YOUNG

@@ -10,8 +10,8 @@ from fenics_contact.design import (
     Maximum,
     Movement,
     Objective,
+    PressureNonuniformity,
     PressureNorm,
-    PressureUnevenness,
     StrainEnergy,
 )
 
@@ -23,7 +23,7 @@ def aims(body: str, surface: str, dim: int = 3) -> dict[str, Objective]:
         "strain energy": StrainEnergy(),
         "largest pressure": LargestPressure(),
         "pressure norm": PressureNorm(),
-        "unevenness": PressureUnevenness(0),
+        "unevenness": PressureNonuniformity(0),
         "area": ContactArea(),
         "friction work": FrictionWork(),
         "largest stress": LargestStress(body),

@@ -27,8 +27,8 @@ from fenics_contact.design import (
     Adjoint,
     Objective,
     Partials,
+    PressureNonuniformity,
     PressureNorm,
-    PressureUnevenness,
     StrainEnergy,
     WeakChoice,
 )
@@ -197,7 +197,7 @@ def test_a_norm_of_an_even_pressure_is_stationary(case: str, p: float) -> None:
 def test_the_unevenness_of_an_even_pressure_under_rubber_is_stationary() -> None:
     """Its norm is not: the true pressure falls where a design widens the deformed surface."""
     scene = pad_on_floor(None, NeoHooke(1.0, 0.3))
-    value, gradient = lower_side(scene, PressureUnevenness(0))(np.zeros(4))
+    value, gradient = lower_side(scene, PressureNonuniformity(0))(np.zeros(4))
     assert abs(value) < 1e-9
     assert np.abs(gradient).max() < 1e-6
 

@@ -37,8 +37,8 @@ from fenics_contact.design import (
     Movement,
     Objective,
     Partials,
+    PressureNonuniformity,
     PressureNorm,
-    PressureUnevenness,
     StrainEnergy,
     TotalPotential,
 )
@@ -122,7 +122,7 @@ def test_a_column_under_even_pressure_has_the_closed_form(name: str, units: str)
 
 @pytest.mark.parametrize("units", UNITS)
 def test_an_even_pressure_has_no_unevenness(units: str) -> None:
-    assert value(PressureUnevenness(), even(units)) == pytest.approx(0.0, abs=1e-8)
+    assert value(PressureNonuniformity(), even(units)) == pytest.approx(0.0, abs=1e-8)
 
 
 @cache
@@ -140,7 +140,7 @@ def test_pressures_are_judged_with_all_points_of_the_slave() -> None:
     assert value(LargestPressure(), mixed()) == pytest.approx(pressure.max(), rel=1e-12)
     spread = (area * (pressure - mean) ** 2).sum() / (mean**2 * total)
     assert spread > 0.1
-    assert value(PressureUnevenness(), mixed()) == pytest.approx(spread, rel=1e-12)
+    assert value(PressureNonuniformity(), mixed()) == pytest.approx(spread, rel=1e-12)
     assert value(ContactArea(), mixed()) == pytest.approx(total / (1 + spread), rel=1e-12)
     for p in (2.0, 8.0, 100.0):
         norm = value(PressureNorm(p=p), mixed())
@@ -239,7 +239,7 @@ def refused(objective: Objective, state: State) -> str:
     return said[0]
 
 
-@pytest.mark.parametrize("objective", [LargestPressure(1), PressureUnevenness(7), FrictionWork(-1)])
+@pytest.mark.parametrize("objective", [LargestPressure(1), PressureNonuniformity(7), FrictionWork(-1)])
 def test_a_pair_that_is_not_there_is_refused(objective: Objective) -> None:
     name, number = type(objective).__name__, objective.pair  # type: ignore[attr-defined]
     known = f"{name}.pair must be the number of a contact pair of the scene, 0 to 0, got {number}"
@@ -270,7 +270,7 @@ def test_exponents_that_smooth_too_much_or_overflow_are_refused(kind: type, p: f
 
 
 @pytest.mark.parametrize(
-    "objective", [LargestPressure(), PressureNorm(0), PressureUnevenness(), ContactArea()]
+    "objective", [LargestPressure(), PressureNorm(0), PressureNonuniformity(), ContactArea()]
 )
 def test_a_design_that_touches_nothing_is_refused(objective: Objective) -> None:
     apart = Column(1.0, 1.0).state(pressure=0.0, gap=0.1)

@@ -32,8 +32,8 @@ from fenics_contact.design import (
     LoadPath,
     Movement,
     Objective,
+    PressureNonuniformity,
     PressureNorm,
-    PressureUnevenness,
     StrainEnergy,
 )
 from fenics_contact.design import (
@@ -46,7 +46,7 @@ from tests.design.deformed_blocks import HARDER, design_problem, pressed
 Patch = pytest.MonkeyPatch
 LeaveOut = Callable[[Patch], None]
 #: True pressures and areas, in every way that an objective has them.
-PRESSURES = PressureNorm() + 0.3 * LargestPressure() + 0.2 * ContactArea() + 0.5 * PressureUnevenness()
+PRESSURES = PressureNorm() + 0.3 * LargestPressure() + 0.2 * ContactArea() + 0.5 * PressureNonuniformity()
 slowly = partial(pytest.param, marks=[pytest.mark.slow, pytest.mark.claim])
 STEP = 3e-5
 

@@ -12,6 +12,7 @@ from types import ModuleType
 import pytest
 
 import fenics_contact
+from fenics_contact import ContactPair, Surface, design
 from fenics_contact._base.form_language import without_setuptools
 from fenics_contact._dolfinx.loading import old
 from tests.conftest import ROOT, launch
@@ -125,3 +126,12 @@ def test_a_library_that_needs_more_of_setuptools_gets_it(monkeypatch: pytest.Mon
         monkeypatch.setattr("fenics_contact._base.form_language.import_module", {"pkg_resources": true}.get)
         assert versions.resource_filename == "of the true one"
         assert versions.get_distribution("never-installed") == "NEVER-INSTALLED"
+
+
+def test_old_names_warn_and_are_the_new_ones() -> None:
+    with pytest.warns(DeprecationWarning, match="PressureUnevenness is now PressureNonuniformity"):
+        assert design.PressureUnevenness is design.PressureNonuniformity
+    pair = ContactPair(Surface("a", "x0"), Surface("a", "x1"))
+    with pytest.warns(DeprecationWarning, match="within_body is now is_self_contact"):
+        assert pair.within_body
+    assert not set(design.__all__) & {"PressureUnevenness", "Pieced"}

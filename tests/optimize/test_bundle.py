@@ -14,8 +14,8 @@ import pytest
 from fenics_contact import Checkpoint, minimize
 from fenics_contact._optimize.bundle import Bundle, Plane
 from fenics_contact._optimize.bundle_trust import first_centre, stopping_test
-from fenics_contact._optimize.constraints import Surroundings, feasible_set
-from fenics_contact._optimize.merit import correcting_step, neighbour, priced_step, surroundings
+from fenics_contact._optimize.constraints import LocalFeasibleSet, feasible_set
+from fenics_contact._optimize.merit import correcting_step, neighbour, penalised_step, surroundings
 from fenics_contact._optimize.nonlinear import SoftConstraint
 from fenics_contact._optimize.problem import pose
 from fenics_contact._optimize.result import Reason, StepKind
@@ -108,7 +108,7 @@ def soft(gradient: list[float], value: float, penalty: float = 1.0) -> SoftConst
     return SoftConstraint(Bundle.of_centre(Plane(np.array(gradient)), 0.0), value, penalty, 1.0)
 
 
-def around(bound: float = 9.0) -> Surroundings:
+def around(bound: float = 9.0) -> LocalFeasibleSet:
     return feasible_set(2, (-bound, bound)).around(np.zeros(2), np.ones(2))
 
 
@@ -117,7 +117,7 @@ DOWN = Bundle.of_centre(Plane(np.array([-1.0, 0.0])), 0.0)
 
 def test_a_penalty_that_is_large_enough_stays() -> None:
     given = [soft([1.0, 0.0], 0.5, 4.0)]
-    step, priced = priced_step(DOWN, around(), 10.0, given, 1e-6)
+    step, priced = penalised_step(DOWN, around(), 10.0, given, 1e-6)
     assert priced == tuple(given)
     assert step.violations[0] == pytest.approx(0.0, abs=1e-8)
     assert step.move == pytest.approx([-0.5, 0.0], abs=1e-6)
@@ -125,7 +125,7 @@ def test_a_penalty_that_is_large_enough_stays() -> None:
 
 
 def test_a_penalty_grows_until_the_step_reduces_the_violation() -> None:
-    step, (one,) = priced_step(DOWN, around(), 10.0, [soft([1.0, 0.0], 0.5, 0.1)], 1e-6)
+    step, (one,) = penalised_step(DOWN, around(), 10.0, [soft([1.0, 0.0], 0.5, 0.1)], 1e-6)
     assert one.penalty == pytest.approx(10.0)
     assert step.violations[0] == pytest.approx(0.0, abs=1e-8)
 
@@ -133,7 +133,7 @@ def test_a_penalty_grows_until_the_step_reduces_the_violation() -> None:
 def test_a_penalty_stays_that_takes_off_a_tenth_of_a_violation_and_grows_where_it_takes_off_less() -> None:
     # The step is t (ρ - 1) long, and all of the violation of 0.5 could be taken off.
     for penalty, wanted in ((1.006, 1.006), (1.004, 10.04)):
-        _, (one,) = priced_step(DOWN, around(), 10.0, [soft([1.0, 0.0], 0.5, penalty)], 1e-6)
+        _, (one,) = penalised_step(DOWN, around(), 10.0, [soft([1.0, 0.0], 0.5, penalty)], 1e-6)
         assert one.penalty == pytest.approx(wanted)
 
 
@@ -148,14 +148,14 @@ def test_equalities_are_rows_of_length_one_whatever_their_units() -> None:
 
 def test_a_penalty_does_not_grow_for_what_is_out_of_reach() -> None:
     # The box allows a fortieth of the violation to be taken off, which the present penalty does.
-    step, (one,) = priced_step(DOWN, around(0.1), 10.0, [soft([1.0, 0.0], 4.0, 5.0)], 1e-6)
+    step, (one,) = penalised_step(DOWN, around(0.1), 10.0, [soft([1.0, 0.0], 4.0, 5.0)], 1e-6)
     assert one.penalty == 5.0
     assert step.violations[0] == pytest.approx(3.9, abs=1e-6)
     assert not step.stuck
 
 
 def test_a_step_between_limits_that_contradict_each_other_is_stuck() -> None:
-    step, _ = priced_step(DOWN, around(), 10.0, [soft([0.0, 1.0], 1.0), soft([0.0, -1.0], 1.0)], 1e-6)
+    step, _ = penalised_step(DOWN, around(), 10.0, [soft([0.0, 1.0], 1.0), soft([0.0, -1.0], 1.0)], 1e-6)
     assert step.stuck
 
 

@@ -35,7 +35,7 @@ def test_contact_between_nodes_is_named_with_its_depth_and_what_to_do(
     rubber: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     state = solve_scene(pressed_on_disc(0.5, rubber=rubber), MPI.COMM_SELF, tolerance=1e-8)
-    (doubt,) = (each for each in state.peak_doubts if isinstance(each, BetweenNodes))
+    (doubt,) = (each for each in state.peak_uncertainties if isinstance(each, BetweenNodes))
     assert 0.3 * DEPTH < doubt.depth < 1.001 * DEPTH
     assert doubt.at[0] == pytest.approx(0.0, abs=1e-3)
     (words,) = (each for each in caplog.messages if "lies between nodes" in each)
@@ -49,7 +49,7 @@ def test_contact_between_nodes_is_named_with_its_depth_and_what_to_do(
 def test_fine_meshes_touch_at_nodes(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         state = solve_scene(pressed_on_disc(0.37, 0.075), MPI.COMM_SELF, tolerance=1e-8)
-    assert not any(isinstance(each, BetweenNodes) for each in state.peak_doubts)
+    assert not any(isinstance(each, BetweenNodes) for each in state.peak_uncertainties)
     assert state.torn.points.inside is None
     assert state.contact.normal_force.sum() > 0.0
     assert not [each for each in caplog.messages if "between nodes" in each]
@@ -85,7 +85,7 @@ def test_forces_are_found_wherever_nodes_lie(cell: float, offsets: int) -> None:
         force, state = force_on(pressed_on_disc(offset, cell))
         error = abs(force / fine()[0] - 1.0)
         assert error < SIZES[cell]
-        assert error < 0.05 or state.peak_doubts
+        assert error < 0.05 or state.peak_uncertainties
 
 
 @pytest.mark.parametrize(("offset", "on"), [(0.5, None), (0.42, None), (0.42, on_tool), (0.5, met_by_disc)])
@@ -97,7 +97,7 @@ def test_rubber_between_nodes_presses_as_what_is_linear(offset: float, on: Any) 
     # Where the disc moves, the gaps around the spot change by its motion, too.
     error = 0.05 if on is met_by_disc else 0.005
     assert float(state.contact.force[:, 1].sum()) == pytest.approx(linear, rel=error)
-    assert any(isinstance(each, BetweenNodes) for each in state.peak_doubts)
+    assert any(isinstance(each, BetweenNodes) for each in state.peak_uncertainties)
 
 
 def test_materials_that_do_not_yield_press_between_nodes_as_elastic_ones() -> None:
@@ -165,7 +165,7 @@ def test_a_ball_between_the_nodes_presses_like_hertz(offset: tuple[float, float]
     force, state = force_on(pressed_on_ball(offset, 0.447, master))
     assert len(state.torn.points.are_inside) == 1
     assert force == pytest.approx(hertz_on_ball(0.447), rel=0.15)
-    assert any(isinstance(each, BetweenNodes) for each in state.peak_doubts)
+    assert any(isinstance(each, BetweenNodes) for each in state.peak_uncertainties)
 
 
 def test_a_force_inside_a_facet_is_in_balance_with_friction_and_about_every_point() -> None:

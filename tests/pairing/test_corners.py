@@ -101,7 +101,7 @@ def test_a_corner_of_the_master_between_nodes_of_the_slave_is_named(
     strain: str, master: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     state = pressed(MATERIALS[strain], "floor y1", master, "node")
-    (doubt,) = (each for each in state.peak_doubts if isinstance(each, CornerBetweenNodes))
+    (doubt,) = (each for each in state.peak_uncertainties if isinstance(each, CornerBetweenNodes))
     np.testing.assert_allclose(doubt.at, (0.0, 0.0), atol=0.06)
     assert 0.005 < doubt.depth <= doubt.moved < 0.06
     (words,) = (each for each in caplog.messages if "lies between nodes" in each)
@@ -121,7 +121,9 @@ def test_a_corner_of_the_master_is_never_wrong_in_silence(strain: str, kind: str
         state = pressed(MATERIALS[strain], "floor y1", "bar under", kind, **there)
         right = force_on(pressed(MATERIALS[strain], "bar under", "floor y1", "node", **there))
         error = np.linalg.norm(force_on(state) - right) / np.linalg.norm(right)
-        named = any(isinstance(each, CornerBetweenNodes | CornerKeptAway) for each in state.peak_doubts)
+        named = any(
+            isinstance(each, CornerBetweenNodes | CornerKeptAway) for each in state.peak_uncertainties
+        )
         assert error < 0.1 or named
         wrong += error > 0.1
     assert wrong
@@ -234,7 +236,7 @@ def test_an_exchanged_pair_stays_so_in_load_steps_designs_and_other_meshes() -> 
 def test_a_corner_of_the_master_that_is_kept_away_is_named(caplog: pytest.LogCaptureFixture) -> None:
     there = {"angle": np.radians(70.0), "offset": -0.16}
     state = pressed(MATERIALS["large"], "floor y1", "bar under", "mortar", **there)
-    (doubt,) = (each for each in state.peak_doubts if isinstance(each, CornerKeptAway))
+    (doubt,) = (each for each in state.peak_uncertainties if isinstance(each, CornerKeptAway))
     corner = np.array(doubt.at)
     assert abs(corner[0]) < 0.05
     (words,) = (each for each in caplog.messages if "presses where nothing touches" in each)
@@ -249,7 +251,7 @@ def test_edges_of_faces_that_lie_flat_are_no_corners_that_press(strain: str, sla
     state = pressed(MATERIALS[strain], slave, master, "mortar", angle=0.0, offset=0.5)
     assert force_on(state)[1] > 10.0
     named = CornerBetweenNodes | CornerKeptAway
-    assert not any(isinstance(each, named) for each in state.peak_doubts)
+    assert not any(isinstance(each, named) for each in state.peak_uncertainties)
 
 
 def test_faces_beside_a_corner_press_straight_down_as_well() -> None:
@@ -278,7 +280,7 @@ def test_a_steep_face_alone_is_right_or_the_face_that_passes_is_named(
     state = pressed(MATERIALS["large"], "bar x0", "floor y1", "best", cells)
     force = force_on(state)
     named = [FacetsOutside("bar x0 on floor y1", 1)] if passes else []
-    assert [each for each in state.peak_doubts if isinstance(each, FacetsOutside)] == named
+    assert [each for each in state.peak_uncertainties if isinstance(each, FacetsOutside)] == named
     words = "bodies 'floor' and 'bar' pass into each other at 1 facet, outside the surfaces of their pairs"
     assert any(each.startswith(words) for each in caplog.messages) == passes
     if not passes:

@@ -14,7 +14,7 @@ import pytest
 from fenics_contact.results import ContactResult
 from tools.random_scenes import meetings_judge
 from tools.random_scenes.judge import GOOD, Outcome
-from tools.random_scenes.meetings import Meeting, Writing, meeting
+from tools.random_scenes.meetings import SlidingPair, Writing, meeting
 from tools.random_scenes.meetings_judge import judge_meeting
 
 QUICK = [0, *range(2, 8)]
@@ -64,7 +64,7 @@ def test_answers_that_differ_are_noticed(factor: float, wrong: bool, monkeypatch
 
 
 def test_a_refusal_of_one_writing_alone_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    def made(seed: int) -> Meeting:
+    def made(seed: int) -> SlidingPair:
         found = meeting(seed)
         return replace(found, other=replace(found.other, length=0.0))
 

@@ -46,7 +46,7 @@ def test_cells_to_the_edge_are_those_of_the_coarser_surface(
     cells: float, ratio: float, to_edge: int | None
 ) -> None:
     state, error = found(cells, ratio)
-    assert [doubt.cells for doubt in state.peak_doubts if isinstance(doubt, CoarsePeak)] == (
+    assert [doubt.cells for doubt in state.peak_uncertainties if isinstance(doubt, CoarsePeak)] == (
         [] if to_edge is None else [to_edge]
     )
     assert error < {1: 1.4, 2: 0.23, None: 0.035}[to_edge]
@@ -55,7 +55,7 @@ def test_cells_to_the_edge_are_those_of_the_coarser_surface(
 
 def test_the_line_of_a_coarse_peak() -> None:
     state, error = found(1.5, 0.75)
-    (doubt,) = state.peak_doubts
+    (doubt,) = state.peak_uncertainties
     words = f"may be off by a tenth, {PLACE} touch within 2 cells of it: {CALL} refines the meshes there"
     assert str(doubt) == words
     assert f"\n  peak pressure    {words}\n" in str(state)
@@ -64,14 +64,14 @@ def test_the_line_of_a_coarse_peak() -> None:
 
 def test_contact_by_nodes_wavers_where_meshes_do_not_match() -> None:
     state, error = found(5.0, 1.5, "node")
-    (doubt,) = state.peak_doubts
+    (doubt,) = state.peak_uncertainties
     assert isinstance(doubt, UnmatchedNodes)
     assert str(doubt) == (
         f"wavers by some percent, {PLACE} touch by nodes where meshes do not match: leave out "
         "discretisation='node'"
     )
     better, smaller = found(5.0, 1.5)
-    assert better.peak_doubts == ()
+    assert better.peak_uncertainties == ()
     assert "peak pressure" not in str(better)
     assert smaller < 0.01 < error
     assert unmatched_nodes(found(5.0, 1.0, "node")[0], 0) is None
@@ -91,7 +91,7 @@ def test_doubts_follow_errors() -> None:
     for ratio in (0.75, 1.5, 2.0, 3.0):
         for cells in (0.8, 1.0, 1.4, 1.8, 2.5, 3.0, 3.5, 4.0, 4.5):
             state, error = found(cells, ratio, axis=generator.uniform(0.0, CELL))
-            doubts = (doubt.cells for doubt in state.peak_doubts if isinstance(doubt, CoarsePeak))
+            doubts = (doubt.cells for doubt in state.peak_uncertainties if isinstance(doubt, CoarsePeak))
             errors[next(doubts, 3)].append(error)
     assert sum(map(len, errors.values())) == 36
     assert min(map(len, errors.values())) >= 6
@@ -118,8 +118,8 @@ def test_a_block_that_turns_has_the_doubt_of_one_that_does_not(turn: float) -> N
     level, turned = on_a_ball(0.0), on_a_ball(turn)
     closed = [int((each.contact.normal_force > 0.0).sum()) for each in (level, turned)]
     assert min(closed) > 2
-    assert [doubt.cells for doubt in level.peak_doubts if isinstance(doubt, CoarsePeak)] == [2]
-    assert [doubt.cells for doubt in turned.peak_doubts if isinstance(doubt, CoarsePeak)] == [2]
+    assert [doubt.cells for doubt in level.peak_uncertainties if isinstance(doubt, CoarsePeak)] == [2]
+    assert [doubt.cells for doubt in turned.peak_uncertainties if isinstance(doubt, CoarsePeak)] == [2]
 
 
 def test_one_point_that_a_bent_strip_presses_is_in_doubt() -> None:
@@ -133,7 +133,7 @@ def test_one_point_that_a_bent_strip_presses_is_in_doubt() -> None:
     free = tip * at**2 * (3.0 * 40.0 - at) / (6.0 * stiffness)
     beam = 3.0 * stiffness * (free - gap) / at**3
     assert 0.8 < state.contact.normal_force.sum() / beam < 0.9
-    (doubt,) = state.peak_doubts
+    (doubt,) = state.peak_uncertainties
     assert isinstance(doubt, CoarsePeak)
     assert (doubt.points, doubt.cells) == (1, 1)
 
@@ -142,11 +142,11 @@ def test_one_point_that_presses_rubber_is_in_doubt(caplog: pytest.LogCaptureFixt
     """Its force is off by a fifth; fine cells leave no doubt."""
     with caplog.at_level(logging.WARNING):
         fine = solve_scene(pressed_on_disc(0.3, 0.075, rubber=True), MPI.COMM_SELF)
-    assert fine.peak_doubts == ()
+    assert fine.peak_uncertainties == ()
     assert caplog.messages == []
     with caplog.at_level(logging.INFO):  # load histories pass through first touches
         coarse = solve_scene(pressed_on_disc(0.0, rubber=True), MPI.COMM_SELF)
-    (doubt,) = coarse.peak_doubts
+    (doubt,) = coarse.peak_uncertainties
     assert isinstance(doubt, CoarsePeak)
     assert (doubt.points, doubt.cells) == (1, 1)
     assert doubt.warning in caplog.messages

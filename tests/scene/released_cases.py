@@ -12,7 +12,7 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     ContactProblem,
-    Kept,
+    HoldCurrent,
     LoadStep,
     Scene,
     Support,
@@ -43,7 +43,7 @@ def at_end(value: Any) -> tuple[Support, ...]:
 STEPS = (
     LoadStep("pull", supports=at_end(PULL)),
     LoadStep("let go", [Traction("bar", "x1", (LOAD, 0.0, 0.0))], [HELD, *SIDES]),
-    LoadStep("keep", supports=at_end(Kept())),
+    LoadStep("keep", supports=at_end(HoldCurrent())),
     LoadStep("unload", []),
     LoadStep("let go again", supports=[HELD, *SIDES]),
     LoadStep("hold at a value", supports=at_end(PULL)),

@@ -17,7 +17,7 @@ from fenics_contact import (
     ContactPair,
     ContactProblem,
     Coulomb,
-    Kept,
+    HoldCurrent,
     LoadSequence,
     LoadStep,
     RigidSurface,
@@ -128,7 +128,7 @@ def test_a_history_with_released_supports_goes_on_from_a_checkpoint(tmp_path: Pa
     def run(count: int, *, resume: bool) -> list[AnyState]:
         scene = sheared_block(Coulomb(FRICTION))
         problem = ContactProblem(scene, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-9))
-        kept = [Support("block", "z1", (Kept(), Kept(), -0.01))]
+        kept = [Support("block", "z1", (HoldCurrent(), HoldCurrent(), -0.01))]
         steps = [*pushed(scene)[:3], LoadStep("keep", supports=kept), *pushed(scene)[3:]]
         sequence = LoadSequence(problem, checkpoint=Checkpoint(file, resume=resume))
         return [sequence.advance(step) for step in steps[:count]]
@@ -176,7 +176,7 @@ def test_a_roller_keeps_what_nodes_have_along_its_direction() -> None:
     scene = Scene(
         {"bar": Body(mesh, steel)}, [Support("bar", "x0")], [Traction("bar", "x1", (2.0, 1.0, 0.0))]
     )
-    kept = [Support("bar", "x0"), Roller("bar", "x1", Kept(), direction)]
+    kept = [Support("bar", "x0"), Roller("bar", "x1", HoldCurrent(), direction)]
     loaded, after = solve_steps(
         ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-10), [LoadStep("load"), LoadStep("keep", [], kept)]
     )
@@ -192,8 +192,10 @@ def test_steps_that_cannot_be_are_refused() -> None:
     sequence.advance(pushed(scene)[0])
     with pytest.raises(InfeasibleError):
         sequence.advance(LoadStep("free", [Traction("block", "x1", (1.0, 0.0, 0.0))], []))
-    varying = LoadStep("x", supports=lambda t: [Support("block", "z1", (Kept(), t, 0.0))], time=1.0)
-    with pytest.raises(InvalidInputError, match=r"LoadStep 'x' that are functions of time .* got Kept: give"):
+    varying = LoadStep("x", supports=lambda t: [Support("block", "z1", (HoldCurrent(), t, 0.0))], time=1.0)
+    with pytest.raises(
+        InvalidInputError, match=r"LoadStep 'x' that are functions of .* got HoldCurrent: give"
+    ):
         sequence.advance(varying)
     soft = Scene({"block": Body(scene.bodies["block"].mesh, NeoHooke(1.0, 0.3))}, [Support("block", "z0")])
     sequence = LoadSequence(ContactProblem(soft, MPI.COMM_SELF))

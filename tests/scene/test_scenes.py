@@ -27,8 +27,8 @@ from fenics_contact import (
     ExponentialClosure,
     FluidPressure,
     FrictionTable,
+    HoldCurrent,
     InitialStress,
-    Kept,
     LinearClosure,
     LinearConstraint,
     LoadStep,
@@ -292,7 +292,7 @@ def test_the_normal_of_a_plane_gets_unit_length() -> None:
 def test_only_a_body_that_may_deform_much_can_touch_itself() -> None:
     mesh = block((0, 0, 0), (1, 1, 1), (2, 2, 2))
     pair = ContactPair(Surface("seal", "z0"), Surface("seal", "z1"))
-    assert pair.within_body
+    assert pair.is_self_contact
     own = replace(pair, master=pair.slave)
     Scene({"seal": Body(mesh, NeoHooke(1.0, 0.3))}, contacts=[pair, own])
     message = "contact of body 'seal' with itself needs a material for large deformations"
@@ -335,7 +335,7 @@ SAMPLES: dict[type, Any] = {
         PLANE, IRON, FACE, BODY, Coulomb(0.3), Tresca(1.0), SampledField(np.eye(3), np.ones(3)),
         ContactPair(FACE, PLANE), Tie(FACE, OTHER), RigidSurface("a", "b", (0, 0, 0)), Roller("a", "b"),
         CyclicSymmetry(FACE, OTHER, (0, 0, 0), (0, 0, 1)),
-        RigidTool("t", PLANE, (0, 0, 0)), ToolMotion("t"), Kept(),
+        RigidTool("t", PLANE, (0, 0, 0)), ToolMotion("t"), HoldCurrent(),
         LinearClosure(1.0), ExponentialClosure(1.0, 1.0), ClosureTable((0.0, 1.0), (0.0, 1.0)),
         FrictionTable((0.0, 1.0), (0.3, 0.2)), SlipTable((0.0, 1.0), (0.3, 0.2)),
         FluidPressure(1.0, "x0"),
@@ -378,7 +378,7 @@ class Odd:
     """No argument of anything."""
 
 
-@pytest.mark.parametrize("kind", [kind for kind in SAMPLES if kind is not Kept])
+@pytest.mark.parametrize("kind", [kind for kind in SAMPLES if kind is not HoldCurrent])
 def test_no_argument_may_be_of_another_type(kind: type) -> None:
     sample = SAMPLES[kind]
     assert fields(sample)

@@ -24,8 +24,8 @@ from fenics_contact.design import (
     Movement,
     NonlinearConstraint,
     Objective,
+    PressureNonuniformity,
     PressureNorm,
-    PressureUnevenness,
     StrainEnergy,
     TotalPotential,
 )
@@ -47,7 +47,7 @@ IN_FILES: list[tuple[Any, Objective, str]] = [
     ("largest_pressure", LargestPressure(), "largest_pressure"),
     ("friction_work", FrictionWork(), "friction_work"),
     ({"kind": "pressure_norm", "pair": 0, "p": 20}, PressureNorm(pair=0, p=20.0), "pressure_norm"),
-    ({"kind": "pressure_unevenness", "pair": 0}, PressureUnevenness(0), "pressure_unevenness"),
+    ({"kind": "pressure_unevenness", "pair": 0}, PressureNonuniformity(0), "pressure_unevenness"),
     ({"kind": "contact_area", "weight": -1}, -ContactArea(), "-1 contact_area"),
     ({"kind": "largest_stress", "body": "upper", "p": 12}, STRESS, "largest_stress"),
     ({"kind": "movement", "body": "upper", "at": "z1", "direction": [0, 0, -1]}, PUSH, "movement"),

@@ -79,10 +79,10 @@ UNSEEN_MUTATIONS = (
     ),
     Mutation(
         "rims of bodies with a chart move by whole bulges",
-        "_adaptive/way_to_images.py",
+        "_adaptive/boundary_defect.py",
         "way[around > 0] = 2.0 / 3.0 * ",
         "way[around > 0] = ",
-        ("tests/adaptive/test_way_to_images.py::test_rims_move_until_their_chords_enclose_the_true_area",),
+        ("tests/adaptive/test_boundary_defect.py::test_rims_move_until_their_chords_enclose_the_true_area",),
     ),
     Mutation(
         "rims of true surfaces move by whole bulges",

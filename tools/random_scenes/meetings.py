@@ -101,7 +101,7 @@ class Writing:
 
 
 @dataclass(frozen=True)
-class Meeting:
+class SlidingPair:
     """A scene of a seed and how it is written a second time.
 
     Attributes:
@@ -119,7 +119,7 @@ class Meeting:
     periodic: bool
 
 
-def meeting(seed: int) -> Meeting:
+def meeting(seed: int) -> SlidingPair:
     """Return the scene of a seed, the same on every machine."""
     dice = Dice(seed)
     meshes = {"low": _mesh(dice, (0.0, 0.0, 0.0), (2.0, 2.0, 1.0))}
@@ -158,7 +158,7 @@ def meeting(seed: int) -> Meeting:
         return scene, [LoadStep(str(k), loads, [*held, *extra]) for k, (loads, extra) in enumerate(steps)]  # type: ignore[misc]
 
     other, pieces = _other(dice), (_pieces(dice), _pieces(dice))
-    return Meeting(", ".join(dice.words), build, other, pieces, periodic)
+    return SlidingPair(", ".join(dice.words), build, other, pieces, periodic)
 
 
 def _mesh(dice: Dice, low: Sequence[float], high: Sequence[float]) -> BodyMesh:

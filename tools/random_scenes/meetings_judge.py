@@ -13,7 +13,7 @@ from fenics_contact import ContactProblem, Scene, State, solve_steps
 from fenics_contact.errors import ConvergenceError, FenicsContactError
 from fenics_contact.mesh import bisection_partition
 from tools.random_scenes.judge import Outcome, Verdict, placed
-from tools.random_scenes.meetings import Meeting, Writing, meeting
+from tools.random_scenes.meetings import SlidingPair, Writing, meeting
 
 #: Relative differences of displacements and of forces, and forces out of balance, at a tolerance of 1e-9.
 AGREE, FORCES, BALANCE = 1e-5, 1e-4, 1e-6
@@ -33,7 +33,7 @@ def judge_meeting(seed: int) -> Verdict:
     return Verdict(seed, outcome, made.words, detail, round(time.perf_counter() - start, 3), products)
 
 
-def _ended(made: Meeting) -> tuple[Outcome, str, int]:
+def _ended(made: SlidingPair) -> tuple[Outcome, str, int]:
     here, there = Writing(), made.other
     one, other = (
         _solved(made, writing, pieces) for writing, pieces in zip((here, there), made.pieces, strict=True)
@@ -54,7 +54,7 @@ def _ended(made: Meeting) -> tuple[Outcome, str, int]:
     return (Outcome.WRONG if found else Outcome.SOLVED), "; ".join(found), products
 
 
-def _solved(made: Meeting, writing: Writing, pieces: int) -> list[State] | Exception:
+def _solved(made: SlidingPair, writing: Writing, pieces: int) -> list[State] | Exception:
     try:
         scene, steps = made.build(writing)
         problem = ContactProblem(scene, MPI.COMM_SELF, partitions=_cut(scene, pieces), tolerance=1e-9)
@@ -73,7 +73,7 @@ def _cut(scene: Scene, pieces: int) -> dict[str, np.ndarray] | None:
 
 
 def _differences(
-    one: list[State], other: list[State], made: Meeting, writings: tuple[Writing, Writing]
+    one: list[State], other: list[State], made: SlidingPair, writings: tuple[Writing, Writing]
 ) -> list[str]:
     """Return in words where both differ at the end of any step."""
     here, there = writings
@@ -98,7 +98,7 @@ def _differences(
     return found
 
 
-def _forces(state: State, writing: Writing, made: Meeting) -> np.ndarray:
+def _forces(state: State, writing: Writing, made: SlidingPair) -> np.ndarray:
     """Return forces of contact at all nodes pair by pair as in the first writing; of periodic ones sums."""
     points = state.contact.points
     forces = np.zeros((len(state.scene.contacts), *state.scene.points.shape))

@@ -26,7 +26,7 @@ from fenics_contact._surfaces.facets import FacetedSurface
 
 
 @dataclass(frozen=True)
-class Gathering:
+class CondensedDualBasis:
     """Points that gather the dual functions of several nodes.
 
     Attributes:
@@ -48,7 +48,7 @@ class Gathering:
         slave: FacetedSurface,
         bearing: np.ndarray | None = None,
         least_share: float = 0.05,
-    ) -> Gathering | None:
+    ) -> CondensedDualBasis | None:
         """Return which points gather what; None if all nodes face the master well and can move.
 
         A node without a neighbour that does keeps its multiplier, and so do all where the rest could not
@@ -64,7 +64,7 @@ class Gathering:
         shared = _shared_facets(whole.node, slave)[np.flatnonzero(well)][:, hardly]
         facets = np.asarray(shared.sum(axis=0)).ravel()
         points = np.union1d(np.flatnonzero(well), hardly[facets == 0.0])
-        if len(points) == len(well) or not _bears_tipping(slave, whole.node[points]):
+        if len(points) == len(well) or not _spans_rotations(slave, whole.node[points]):
             return None
         shares = (shared @ sp.diags(1.0 / np.maximum(facets, 1.0))).tocoo()
         count = len(points)
@@ -75,7 +75,7 @@ class Gathering:
         own = part @ sp.diags(whole.area)
         return cls(whole, points, part, scaled_rows(own, 1.0 / np.asarray(own.sum(axis=1)).ravel()))
 
-    def chosen(self, points: np.ndarray) -> Gathering:
+    def chosen(self, points: np.ndarray) -> CondensedDualBasis:
         """Return some of the points, by indices or a mask."""
         return replace(self, point=self.point[points], part=self.part[points], own=self.own[points])
 
@@ -140,7 +140,7 @@ def _shared_facets(node: np.ndarray, slave: FacetedSurface) -> sp.csr_matrix:
     return (of_facets.T @ of_facets).tocsr()
 
 
-def _bears_tipping(slave: FacetedSurface, nodes: np.ndarray) -> bool:
+def _spans_rotations(slave: FacetedSurface, nodes: np.ndarray) -> bool:
     """Return whether some nodes extend in all directions of their surface, as a row of them does not."""
     if len(nodes) < slave.dim:
         return False

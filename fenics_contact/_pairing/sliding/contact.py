@@ -23,8 +23,8 @@ from fenics_contact._pairing.sliding.meeting import (
     Candidates,
     Found,
     Known,
-    Meeting,
     Moved,
+    SlidingPair,
     joined_once,
     require_inside,
     shared_once,
@@ -43,7 +43,7 @@ from fenics_contact._scene.touching import may_touch
 from fenics_contact.errors import InvalidInputError, together
 
 #: Kinds of counterparts of nodes that move far, the first that serves a pair has it.
-KINDS: tuple[type[Meeting], ...] = (OnOwnBody, OnMeans, OnPatches, OnTool, OnMovingObstacle, OnObstacle)
+KINDS: tuple[type[SlidingPair], ...] = (OnOwnBody, OnMeans, OnPatches, OnTool, OnMovingObstacle, OnObstacle)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class SlidingContact:
     fixed: np.ndarray
     comm: MPI.Comm
     reach: float
-    meetings: tuple[Meeting, ...]
+    meetings: tuple[SlidingPair, ...]
     axes: LocalAxes = NO_AXES
 
     @classmethod
@@ -170,7 +170,7 @@ class SlidingContact:
         found = self.at(coordinates, LastPoints.of(stored), time, loose=loose)
         return found, MaterialPoints.of(stored, len(coordinates))
 
-    def _found(self, meeting: Meeting, moved: Moved) -> Found:
+    def _found(self, meeting: SlidingPair, moved: Moved) -> Found:
         """Return the points of one pair. Collective."""
         found = meeting.at(moved)
         axes = _kept_axes(found.points, moved.last, meeting.number)
@@ -190,7 +190,7 @@ def _kept_axes(points: ContactPoints, last: Known, index: int, steepest: float =
 
 def meetings_of(
     scene: Scene, fixed: np.ndarray, comm: MPI.Comm, axes: LocalAxes = NO_AXES
-) -> tuple[Meeting, ...]:
+) -> tuple[SlidingPair, ...]:
     """Return the pairs of a scene in its reference configuration. Collective.
 
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
@@ -208,7 +208,7 @@ def meetings_of(
         return joined_once(meetings, scene, points, ties)
 
 
-def _meeting(scene: Scene, number: int, fixed: np.ndarray, tied: np.ndarray) -> Meeting:
+def _meeting(scene: Scene, number: int, fixed: np.ndarray, tied: np.ndarray) -> SlidingPair:
     """Return a pair; `tied`: nodes that have no points, as ties hold them."""
     pair, dim = scene.contacts[number], scene.dim
     kind = next(each for each in KINDS if each.serves(pair))

@@ -155,7 +155,7 @@ class Candidates:
 
 
 @dataclass(frozen=True)
-class Meeting(Candidates, ABC):
+class SlidingPair(Candidates, ABC):
     """A contact pair: its slave and, of each kind, its counterpart."""
 
     @classmethod
@@ -170,7 +170,7 @@ class Meeting(Candidates, ABC):
 
     @classmethod
     @abstractmethod
-    def of(cls, scene: Scene, pair: ContactPair, side: Candidates, master: Any) -> Meeting:
+    def of(cls, scene: Scene, pair: ContactPair, side: Candidates, master: Any) -> SlidingPair:
         """Return the slave of a pair with its counterpart."""
 
     @abstractmethod
@@ -200,8 +200,8 @@ def require_inside(scene: Scene) -> None:
 
 
 def joined_once(
-    meetings: tuple[Meeting, ...], scene: Scene, points: ContactPoints, ties: ContactPoints
-) -> tuple[Meeting, ...]:
+    meetings: tuple[SlidingPair, ...], scene: Scene, points: ContactPoints, ties: ContactPoints
+) -> tuple[SlidingPair, ...]:
     """Return the pairs with one of two candidates where both move alike: around sectors, and at sections.
 
     `points`, `ties`: those of undeformed bodies.
@@ -219,7 +219,7 @@ def joined_once(
     return tuple(_once_at_sections(scene, met) for met in meetings)
 
 
-def _once_at_sections(scene: Scene, meeting: Meeting, across: float = 0.1) -> Meeting:
+def _once_at_sections(scene: Scene, meeting: SlidingPair, across: float = 0.1) -> SlidingPair:
     """Return a pair by nodes with one of two candidates on both sides of a section, see `once_at_sections`.
 
     `across`: largest cosine between normals of contact and section with which they count as across.
@@ -236,7 +236,7 @@ def _once_at_sections(scene: Scene, meeting: Meeting, across: float = 0.1) -> Me
     return meeting
 
 
-def shared_once(meetings: tuple[Meeting, ...], scene: Scene) -> tuple[Meeting, ...]:
+def shared_once(meetings: tuple[SlidingPair, ...], scene: Scene) -> tuple[SlidingPair, ...]:
     """Return the pairs, of which each node that meets the same by nodes has points of the first only.
 
     Wherever the bodies lie, such nodes have the same counterpart in both pairs: the split of their force
@@ -258,10 +258,10 @@ def _meet_alike(pair: ContactPair, other: ContactPair) -> bool:
     same = one is two or (isinstance(one, (Surface, RigidPlane)) and one == two)
     given = (pair.gap, pair.interference, pair.adjust) == (other.gap, other.interference, other.adjust)
     by_mortar = pair.by_mortar or other.by_mortar
-    return same and given and not by_mortar and not pair.within_body and pair.geometry == other.geometry
+    return same and given and not by_mortar and not pair.is_self_contact and pair.geometry == other.geometry
 
 
-def _split(kept: Meeting, lost: Meeting, beside: bool) -> tuple[Meeting, Meeting]:
+def _split(kept: SlidingPair, lost: SlidingPair, beside: bool) -> tuple[SlidingPair, SlidingPair]:
     """Return two pairs, the second without the nodes that both have where their surfaces run on smoothly."""
     _, here, there = np.intersect1d(kept.nodes, lost.nodes, return_indices=True)
     normals = kept.slave.normals[kept.candidates[here]], lost.slave.normals[lost.candidates[there]]

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from fenics_contact._base.checks import floats
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._pairing.points import ContactPoints, with_symmetry
-from fenics_contact._pairing.sliding.meeting import Candidates, Found, Meeting, Moved, Placement
+from fenics_contact._pairing.sliding.meeting import Candidates, Found, Moved, Placement, SlidingPair
 from fenics_contact._pairing.sliding.stiffness import without_patches
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface
@@ -22,7 +22,7 @@ from fenics_contact.shapes.simple import SurfaceShape, evaluate_shape
 
 
 @dataclass(frozen=True)
-class OnObstacle(Meeting):
+class OnObstacle(SlidingPair):
     """Nodes that meet a rigid obstacle at rest."""
 
     obstacle: Any
@@ -39,7 +39,7 @@ class OnObstacle(Meeting):
         return pair.master
 
     @classmethod
-    def of(cls, scene: Scene, pair: ContactPair, side: Candidates, master: Any) -> Meeting:
+    def of(cls, scene: Scene, pair: ContactPair, side: Candidates, master: Any) -> SlidingPair:
         """Return the slave with the obstacle."""
         return cls(**vars(side), obstacle=master)
 

@@ -15,7 +15,7 @@ from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._pairing.search import find_contact_points, in_reach
 from fenics_contact._pairing.sliding.means import MeanTangents, MovingMeans, PointAreas, interleaved, placed
-from fenics_contact._pairing.sliding.meeting import Meeting
+from fenics_contact._pairing.sliding.meeting import SlidingPair
 from fenics_contact._pairing.sliding.slip import LAST, MaterialPoints, slip_by_start, slip_by_start_of_means
 from fenics_contact._pairing.sliding.stiffness import (
     Differential,
@@ -33,8 +33,8 @@ from fenics_contact.errors import together
 
 
 def with_given_offsets(
-    meetings: tuple[Meeting, ...], scene: Scene, stood: ContactPoints, fixed: np.ndarray, comm: MPI.Comm
-) -> tuple[Meeting, ...]:
+    meetings: tuple[SlidingPair, ...], scene: Scene, stood: ContactPoints, fixed: np.ndarray, comm: MPI.Comm
+) -> tuple[SlidingPair, ...]:
     """Return the pairs with the offsets that their given gaps need. Collective.
 
     The gap of a node counts from its distance as it is measured while bodies move, which by mortar is one
@@ -59,7 +59,7 @@ def with_given_offsets(
 
 
 def _offsets(
-    meeting: Meeting,
+    meeting: SlidingPair,
     pair: ContactPair,
     place: np.ndarray,
     first: ContactPoints,
@@ -80,7 +80,7 @@ def _offsets(
     return np.where(near, target - moving, 0.0), near | (pair.interference == "measured")
 
 
-def _of_candidates(meeting: Meeting, points: ContactPoints, index: int) -> np.ndarray:
+def _of_candidates(meeting: SlidingPair, points: ContactPoints, index: int) -> np.ndarray:
     """Return the distances of a pair's points at its candidates, NaN where these have none, [length]."""
     distance, mine = np.full(len(meeting.candidates), np.nan), points.pair == index
     mine &= np.isin(points.slave, meeting.nodes)  # tied nodes are no candidates

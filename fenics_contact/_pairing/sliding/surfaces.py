@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers, with_symmetry
 from fenics_contact._pairing.sliding.closest import ClosestPoints, Roles, patch_points
 from fenics_contact._pairing.sliding.means import MovingMeans
-from fenics_contact._pairing.sliding.meeting import Candidates, Found, Meeting, Moved
+from fenics_contact._pairing.sliding.meeting import Candidates, Found, Moved, SlidingPair
 from fenics_contact._pairing.sliding.patches import SmoothPatches
 from fenics_contact._pairing.sliding.stiffness import Differential, without_patches
 from fenics_contact._scene.pairs import ContactPair, Surface
@@ -24,7 +24,7 @@ from fenics_contact.errors import together
 
 
 @dataclass(frozen=True)
-class OnSurface(Meeting):
+class OnSurface(SlidingPair):
     """A slave that meets a surface of a body.
 
     Attributes:
@@ -67,7 +67,7 @@ class OnMeans(OnSurface):
         return pair.by_mortar
 
     @classmethod
-    def of(cls, scene: Scene, pair: ContactPair, side: Candidates, master: Any) -> Meeting:
+    def of(cls, scene: Scene, pair: ContactPair, side: Candidates, master: Any) -> SlidingPair:
         """Return the slave with the facets of the master."""
         return cls(**vars(side), master_nodes=cls.numbers(scene, pair, master), facets=master)
 
@@ -187,7 +187,7 @@ class OnOwnBody(OnPatches):
     @classmethod
     def serves(cls, pair: ContactPair) -> bool:
         """Bodies that meet themselves."""
-        return pair.within_body
+        return pair.is_self_contact
 
     @classmethod
     def of(

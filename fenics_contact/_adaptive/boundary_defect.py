@@ -9,7 +9,7 @@ from fenics_contact.mesh.faces import boundary_faces, match_faces, vector_areas
 from fenics_contact.mesh.hanging import HangingNodes
 
 
-def way_to_images(mesh: BodyMesh) -> np.ndarray:
+def boundary_defect(mesh: BodyMesh) -> np.ndarray:
     """Return how nodes move so that facets enclose as much as the images by the chart, shape (n_nodes, dim).
 
     What is between a facet and the images is integrated as of quadratic facets through the images of its

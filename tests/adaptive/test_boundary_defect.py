@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Body, BodyMesh, ContactProblem, LinearState, Scene, Support, TotalForce, goal_error
-from fenics_contact._adaptive.way_to_images import way_to_images
+from fenics_contact._adaptive.boundary_defect import boundary_defect
 from fenics_contact.design import Movement, Objective, TotalPotential
 from fenics_contact.gallery import LinkShape, block, chain_link, rectangle
 from fenics_contact.gallery.blocks import split_hexahedra
@@ -62,7 +62,7 @@ def test_facets_that_move_so_far_enclose_the_true_volume(cell: str) -> None:
         if level:
             marked = np.linalg.norm(mesh.points[mesh.cells].mean(axis=1), axis=1) < 15.0
             mesh = refined(mesh, marked).mesh
-        moved = mesh.moved(mesh.points + way_to_images(mesh))
+        moved = mesh.moved(mesh.points + boundary_defect(mesh))
         away.append((shape.volume - moved.volume) / (shape.volume - mesh.volume))
     assert np.abs(away).max() < 0.06
 
@@ -77,7 +77,7 @@ def test_rims_stay_in_the_planes_where_curved_sides_end(cell: str, hanging: bool
         mesh = refined(
             mesh, np.linalg.norm(mesh.points[mesh.cells].mean(axis=1) - [0, 3, 0], axis=1) < 1.2
         ).mesh
-    way, (x, y, z) = way_to_images(mesh), mesh.points.T
+    way, (x, y, z) = boundary_defect(mesh), mesh.points.T
     assert np.abs(way).max() > 0.005
     for side, axis in ((x, 0), (y, 1), (z, 2), (z - 1.0, 2)):
         on_side = np.abs(side) < 1e-9
@@ -96,7 +96,7 @@ def test_rims_move_until_their_chords_enclose_the_true_area(cell: str) -> None:
     straight = block((0.0, 2.0, 0.0), (np.pi / 2, 3.0, 1.0), (8, 2, 3))
     mesh = BodyMesh(bent(straight.points), straight.cells, chart=Chart(bent, straight.points))
     mesh = split_hexahedra(mesh) if cell == "tetrahedron" else mesh
-    way, (x, y, z) = way_to_images(mesh), mesh.points.T
+    way, (x, y, z) = boundary_defect(mesh), mesh.points.T
     rim = np.flatnonzero((np.abs(z) < 1e-9) & (np.abs(np.hypot(x, y) - 3.0) < 1e-9))
     rim = rim[np.argsort(x[rim])][1:-1]  # at its ends edges of other sides move it, too
     angle = np.arctan2(x[rim[-1]], y[rim[-1]]) - np.arctan2(x[rim[0]], y[rim[0]])

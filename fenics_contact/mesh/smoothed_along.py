@@ -9,7 +9,7 @@ from fenics_contact.mesh.cell_types import cell_type_of
 from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 
 
-def drawn_along(
+def smoothed_along(
     moved: np.ndarray,
     free: np.ndarray,
     straight: np.ndarray,

@@ -22,12 +22,12 @@ from fenics_contact.results.state import State
 Refine = Callable[[Scene, Mapping[str, np.ndarray]], SceneRefinement]
 
 
-def doubted_pairs(state: State) -> list[int]:
+def underresolved_pairs(state: State) -> list[int]:
     """Return the numbers of the contact pairs whose spot is too small for its cells, or but one facet.
 
     Also of those that touch between nodes.
     """
-    places = {each.place for each in state.peak_doubts if isinstance(each, CoarsePeak | BetweenNodes)}
+    places = {each.place for each in state.peak_uncertainties if isinstance(each, CoarsePeak | BetweenNodes)}
     closed = state.contact.points.pair[state.contact.normal_force > 0.0]
     pressing = np.bincount(closed, minlength=len(state.scene.contacts))
     few = (pressing > 0) & (pressing <= 2 ** (state.scene.dim - 1))

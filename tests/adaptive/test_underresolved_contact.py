@@ -23,7 +23,7 @@ from fenics_contact import (
     theory,
 )
 from fenics_contact._adaptive import levels
-from fenics_contact._adaptive.small_spots import doubted_pairs, refined_at_spots
+from fenics_contact._adaptive.underresolved_contact import refined_at_spots, underresolved_pairs
 from fenics_contact.design import PeakPressure
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh.cell_types import CELL_TYPES, shape_values
@@ -72,8 +72,8 @@ def widths_around(scene: Scene, place: tuple[float, ...]) -> np.ndarray:
 
 
 def test_contacts_of_one_facet_are_doubted():
-    assert doubted_pairs(solve_scene(flat(1), MPI.COMM_SELF)) == [0]
-    assert doubted_pairs(solve_scene(flat(3), MPI.COMM_SELF)) == []
+    assert underresolved_pairs(solve_scene(flat(1), MPI.COMM_SELF)) == [0]
+    assert underresolved_pairs(solve_scene(flat(3), MPI.COMM_SELF)) == []
 
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
