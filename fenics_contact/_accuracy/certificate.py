@@ -124,7 +124,7 @@ class _Search:
 
 def scaling_factors(problem: DualProblem) -> Vector:
     """Return the factors of the scaled multipliers, one where stiffness is uniform, owned."""
-    return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor
+    return problem.scaling.factor * np.ones(problem.layout.size)
 
 
 #: Imbalance above this fraction of all forces, at which duality gives no bound.

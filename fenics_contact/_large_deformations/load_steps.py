@@ -179,9 +179,9 @@ class Path:
     `start`: these in material coordinates of the master, of others where they were first found; None where
     contact is that of the undeformed bodies; `fractions`: parts of the load at which equilibria were found,
     the last one being 1; `since`: the part from which slip and the histories of materials are one step up to
-    the end: 0, unless parts are steps of their own or bodies snapped; `earlier_friction_work`: that
-    before the last step of histories, zero where the whole load is one, [force · length]; `effort`: that of all parts,
-    those that were cut included.
+    the end: 0, unless parts are steps of their own or bodies snapped; `earlier_friction_work`: that before
+    the last step of histories, zero where the whole load is one, [force · length]; `effort`: that of all
+    parts, those that were cut included.
     """
 
     load: Loading

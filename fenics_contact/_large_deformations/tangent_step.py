@@ -82,9 +82,9 @@ class TangentProblem:
 
     def scaled(self) -> TangentProblem:
         """Return the problem in the multipliers of `DualProblem.scaling`, itself where there is none."""
-        if self.problem.scaling is None:
+        if not self.problem.scaling:
             return self
-        s = self.problem.scaling.factor
+        s = self.problem.scaling.factor * np.ones_like(self.multiplier)
         return replace(
             self,
             problem=self.problem.scaled_problem,
@@ -162,11 +162,11 @@ def tangent_step(
     margin: float = 0.0,
 ) -> TangentStep | None:
     """Solve the face that the natural map selects; None where it does not hold every body. Collective."""
-    factor = None if tangent.problem.scaling is None else tangent.problem.scaling.factor
+    factor = tangent.problem.scaling.factor
     at = tangent.scaled()
     problem = at.problem
     bound = (1.0 - margin) * problem.law.bound(at.multiplier)
-    ratio = step if factor is None else np.asarray(step / factor**2, dtype=np.float64)
+    ratio = np.asarray(step / factor**2, dtype=np.float64)
     face = classify(problem.layout, bound, at.multiplier, at.residual, ratio, problem.compliance)
     operator = CountedOperator(problem.operator)
     moving, fixed = growing_basis(problem.comm, face, problem.law.growth(at.multiplier), at.multiplier)
@@ -175,9 +175,7 @@ def tangent_step(
         return None
     change, motions, stop = solved.solve(fixed, forcing, floor, max_products)
     motions = solved.at.resisted.motions(change, motions)
-    multiplier = at.multiplier + change
-    if factor is not None:
-        multiplier = multiplier * factor
+    multiplier = (at.multiplier + change) * factor
     return TangentStep(multiplier, motions, face, operator.products, stop)
 
 
@@ -213,7 +211,7 @@ def tangent_adjoint(
     `coupling`: growth of slipping forces with their normal forces; `load`: e, replicated.
     """
     problem = tangent.problem
-    factor = 1.0 if problem.scaling is None else problem.scaling.factor
+    factor = problem.scaling.factor
     problem = problem.with_load(right, load)
     nothing = np.zeros_like(tangent.multiplier)
     at = replace(tangent, problem=problem, multiplier=nothing, residual=nothing).scaled()

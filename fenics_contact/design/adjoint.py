@@ -385,10 +385,8 @@ def _scaled(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np.nda
 
     The factors are uniform within a contact point, so that both bases of a face are unchanged.
     """
-    if problem.scaling is None:
-        return problem, face, 1.0
-    factor = problem.scaling.factor
-    return problem.scaled_problem, face.scaled(factor), factor
+    scaling = problem.scaling
+    return problem.scaled_problem, scaling.of_face(face), scaling.factor
 
 
 def require_from_rest(state: State) -> None:

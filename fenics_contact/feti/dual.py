@@ -26,7 +26,7 @@ from fenics_contact.feti.reduced_coarse import Elimination
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.problem import DualProblem, Operator, Scaling
+from fenics_contact.qp.problem import DualProblem, Operator, Scaling, Unscaled
 
 
 class DirichletPreconditioner:
@@ -224,8 +224,7 @@ class DualSystem:
         self._require_unloaded()
         with timer.phase("coarse space"):
             coarse = previous.problem.coarse.with_load(self._resultants(self.torn.numbering.comm))
-            scaling = previous.problem.scaling
-            scaling = None if scaling is None else scaling.with_load(coarse.load)
+            scaling = previous.problem.scaling.with_load(coarse.load)
         operator, exact = self._operators
         self.problem = replace(
             previous.problem,
@@ -481,8 +480,8 @@ class DualSystem:
         of_block[block] = 1.0 / decomposition.tearing.copy_stiffness[here]
         return of_block[self.inverse.interface // self.torn.components]
 
-    def _scaling(self, coarse: CoarseSpace) -> Scaling | None:
-        """Return factors √(b·b / b·D⁻¹b) of the rows b of B, None where stiffness is uniform. Collective."""
+    def _scaling(self, coarse: CoarseSpace) -> Scaling | Unscaled:
+        """Return factors √(b·b / b·D⁻¹b) of the rows b of B, one where stiffness is uniform. Collective."""
         B, numbering = self._B_interface, self.torn.numbering
         squares = B.multiply(B)
         plain, weighted = (
@@ -494,7 +493,7 @@ class DualSystem:
         # Factors that hardly differ are not worth scaling with.
         low = numbering.comm.allreduce(factor.min(initial=np.inf), op=MPI.MIN)
         high = numbering.comm.allreduce(factor.max(initial=0.0), op=MPI.MAX)
-        return None if high - low <= 1e-6 * high else Scaling.build(factor / high, coarse)
+        return Unscaled() if high - low <= 1e-6 * high else Scaling.build(factor / high, coarse)
 
     def _diagonal(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the diagonal of F on contact rows, one elsewhere, and marks of filled rows. Collective."""

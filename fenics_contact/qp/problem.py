@@ -15,7 +15,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.cones import FeasibleSet, SlipLaw, TrescaLaw
-from fenics_contact.qp.face import Marks
+from fenics_contact.qp.face import Face, Marks
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
 
@@ -71,6 +71,33 @@ class LeastSizes:
     everything: float = 0.0
 
 
+@dataclass(frozen=True)
+class Unscaled:
+    """Multipliers of uniform stiffness as they are, see `Scaling`.
+
+    Attributes:
+        factor: One.
+    """
+
+    factor: float = 1.0
+
+    def __bool__(self) -> bool:
+        """Tell that nothing is scaled."""
+        return False
+
+    def with_load(self, load: Vector) -> Unscaled:
+        """Return itself: nothing depends on e."""
+        return self
+
+    def of_face(self, face: Face) -> Face:
+        """Return a face as it is."""
+        return face
+
+    def applied_to(self, problem: DualProblem) -> DualProblem:
+        """Return a problem as it is."""
+        return problem
+
+
 @dataclass(frozen=True, eq=False)
 class DualProblem:
     """The data of a dual solver: an operator, a coarse space and the layout of vectors.
@@ -86,7 +113,7 @@ class DualProblem:
         layout: Positions of normal and tangential multipliers.
         diagonal: Approximate positive diagonal of F, owned, shape (size,); only contact rows are used.
         preconditioner: Approximation of F⁻¹, symmetric positive definite, owned to owned, collective.
-        scaling: Factors of multipliers between parts of different stiffness, or None.
+        scaling: Factors of multipliers between parts of different stiffness.
         reach: (λ, α) ↦ abs(B) abs(u), the size of the displacements at each row, owned, collective, with
             which the jumps of a solution are compared. None where displacements are not known.
         supported: Marks of contact rows that supports alone determine, owned, shape (size,): no multiplier
@@ -107,7 +134,7 @@ class DualProblem:
     layout: ContactLayout
     diagonal: Vector
     preconditioner: Operator | None = None
-    scaling: Scaling | None = None
+    scaling: Scaling | Unscaled = Unscaled()
     reach: Callable[[Vector, Vector], Vector] | None = None
     supported: Marks | None = None
     friction: SlipLaw | None = None
@@ -150,13 +177,13 @@ class DualProblem:
 
     def with_load(self, rhs: Vector, load: Vector) -> DualProblem:
         """Return the same problem with other right sides d, owned, and e, shape (m,), replicated."""
-        scaling = None if self.scaling is None else self.scaling.with_load(load)
-        return replace(self, rhs=rhs, coarse=self.coarse.with_load(load), scaling=scaling)
+        coarse, scaling = self.coarse.with_load(load), self.scaling.with_load(load)
+        return replace(self, rhs=rhs, coarse=coarse, scaling=scaling)
 
     @cached_property
     def scaled_problem(self) -> DualProblem:
         """The problem in multipliers scaled by `scaling`, itself where there is none."""
-        return self if self.scaling is None else self.scaling.applied_to(self)
+        return self.scaling.applied_to(self)
 
     def dot(self, x: Vector, y: Vector) -> float:
         """Return the global inner product of two owned vectors. Collective."""
@@ -223,6 +250,10 @@ class Scaling:
         """Return the scaling of a problem with another right side e; factors are shared."""
         return replace(self, coarse=self.coarse.with_load(load))
 
+    def of_face(self, face: Face) -> Face:
+        """Return a face of λ as one of μ."""
+        return face.scaled(self.factor)
+
     def applied_to(self, problem: DualProblem) -> DualProblem:
         """Return the problem for μ, see `DualProblem.scaled_problem`."""
         s, precondition, reach = self.factor, problem.preconditioner, problem.reach
@@ -240,7 +271,7 @@ class Scaling:
             coarse=self.coarse,
             diagonal=s**2 * problem.diagonal,
             preconditioner=None if precondition is None else _scaled(precondition, s),
-            scaling=None,
+            scaling=Unscaled(),
             reach=None if reach is None else lambda x, alpha: s * reach(s * x, alpha),
             friction=None if friction is None else friction.scaled(discs),
             compliance=None if problem.compliance is None else problem.compliance.scaled(s),
@@ -285,14 +316,16 @@ class _ScaledRows:
         return found and (self.factor * found[0], found[1] / self.factor, *found[2:])
 
 
+def _unheard(products: int, residual: float | None) -> None:
+    """Tell nobody."""
+
+
 class CountedOperator:
     """The dual operator together with the number of times it was applied."""
 
-    def __init__(
-        self, operator: Operator, report: Report | None = None, exact: Operator | None = None
-    ) -> None:
+    def __init__(self, operator: Operator, report: Report = _unheard, exact: Operator | None = None) -> None:
         """Wrap ``operator``; ``exact`` is F in double precision where it is in single precision."""
-        self._operator, self._report, self._exact = operator, report, exact or operator
+        self._operator, self.report, self._exact = operator, report, exact or operator
         self.products = 0
 
     def __call__(self, x: Vector) -> Vector:
@@ -314,11 +347,6 @@ class CountedOperator:
         return CountedOperator(
             self._operator, lambda products, residual: self.report(before + products, residual), self._exact
         )
-
-    def report(self, products: int, residual: float | None) -> None:
-        """Report the number of products and the residual reached."""
-        if self._report is not None:
-            self._report(products, residual)
 
 
 class ShiftedOperator:

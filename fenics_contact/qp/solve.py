@@ -176,7 +176,7 @@ def solve(
     with together(problem.comm):
         under_law = problem.with_law(law or _slip_law(problem, slip_bound, friction_coefficient))
     same = isinstance(start, DualSolution) and start.problem is problem
-    find = _solve_scaled if problem.scaling is not None else _solve_as_given
+    find = _solve_scaled if problem.scaling else _solve_as_given
     found = _settled(under_law, find(under_law, solver, start, same), solver.tolerance)
     return replace(found, problem=problem)
 
@@ -274,7 +274,6 @@ def _solve_scaled(
 
 def _scaled_start(problem: DualProblem, start: DualSolution | Vector | None) -> DualSolution | Vector | None:
     """Return the start for μ, λ = s μ, see `Scaling`."""
-    assert problem.scaling is not None
     s = problem.scaling.factor
     if not isinstance(start, DualSolution):
         return None if start is None else np.asarray(start / s, dtype=np.float64)
@@ -288,7 +287,6 @@ def _unscaled(problem: DualProblem, solution: DualSolution) -> DualSolution:
     Jumps that are last digits for μ, whose rows are equally stiff, are so for λ: where soft and stiff parts
     are held side by side, jumps of the soft ones would be compared with motions of the stiff ones.
     """
-    assert problem.scaling is not None
     s = problem.scaling.factor
     multiplier, product = s * solution.multiplier, solution.product / s
     answer = answer_at(problem, multiplier, product, solution.alpha)

@@ -308,7 +308,7 @@ def test_subgradients_are_right_and_take_few_products_on_a_stiff_foundation(stif
     alpha = 0.005 * np.random.default_rng(1).standard_normal(uneven.size)
     direction, h = np.random.default_rng(2).standard_normal(uneven.size), 1e-5
     point = uneven.evaluate(alpha)
-    assert point.state.dual.problem.scaling is not None
+    assert point.state.dual.problem.scaling
     ahead, behind = (uneven.value_of(alpha + sign * h * direction) for sign in (1, -1))
     slope = (ahead - behind) / (2 * h)
     assert abs(slope) > 1e-3
