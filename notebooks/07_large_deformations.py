@@ -119,7 +119,7 @@ x, y = slider.points.T
 rim = 3.0 + 0.3 * (x - 1.6) ** 2
 slider = replace(slider, points=np.column_stack([x, rim + (4.0 - rim) * (y - 3.0)]))
 bodies = {"bed": Body(bed, rubber), "slider": Body(slider, Yeoh((5.0, 0.0, 50.0)))}
-friction_work = ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), Coulomb(0.3), "node")
+rubbing = ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), Coulomb(0.3), "node")
 
 
 def moved(right, down):
@@ -133,7 +133,7 @@ def moved(right, down):
 
 way = [(0.0, 0.15), (0.0, 0.3), *((right, 0.3) for right in (0.25, 0.5, 0.75, 1.0))]
 steps = [LoadStep(f"{right} mm right, {down} mm down", supports=moved(right, down)) for right, down in way]
-drawn = ContactProblem(Scene(bodies, moved(0.0, 0.0), contacts=[friction_work]), MPI.COMM_WORLD)
+drawn = ContactProblem(Scene(bodies, moved(0.0, 0.0), contacts=[rubbing]), MPI.COMM_WORLD)
 states = solve_steps(drawn, steps)
 for step, state in zip(steps, states, strict=True):
     pull, push = state.reactions()[1].force
@@ -247,7 +247,7 @@ linear = {
     name: Body(body.mesh, materials.PlaneStrain(9 * k * g / (3 * k + g), (3 * k - 2 * g) / (6 * k + 2 * g)))
     for (name, body), (k, g) in zip(bodies.items(), ((5.0, 1.0), (50.0, 10.0)), strict=True)
 }
-small = solve_scene(Scene(linear, moved(0.0, 0.15), contacts=[friction_work]), MPI.COMM_WORLD, tolerance=1e-8)
+small = solve_scene(Scene(linear, moved(0.0, 0.15), contacts=[rubbing]), MPI.COMM_WORLD, tolerance=1e-8)
 large = states[0]
 products = [each.counts["f_products"] for each in (small, large)]
 print(f"small strains: {products[0]} products, 1 factorisation")

@@ -192,8 +192,10 @@ class OfPressures(Weighable, ABC):
 
     A node's pressure is its force over its area, that of the deformed slave where it deforms much, as of
     `ContactResult.pressure`. Nodes on the rim of a surface have small areas: where facets are wide, their
-    pressure is less certain than that of the others. `pair`: number of the contact pair in the scene; None
-    for the points of all pairs.
+    pressure is less certain than that of the others.
+
+    Attributes:
+        pair: Number of the contact pair in the scene; None for the points of all pairs.
     """
 
     pair: int | None = None

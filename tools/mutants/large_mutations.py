@@ -96,8 +96,8 @@ LARGE_MUTATIONS = (
     Mutation(
         "friction of parts with histories of their own is not added up",
         "_large_deformations/load_steps.py",
-        "rubbed += self.end.evaluation.rubbing",
-        "rubbed = 0.0",
+        "earlier_friction_work += self.end.evaluation.friction_work",
+        "earlier_friction_work = 0.0",
         (
             "tests/large_deformations/test_prescribed_motion.py::test_friction_to_and_fro_within_a_load_step_is_the_sum"
             "_over_parts_with_histories_of_their_own",
