@@ -391,12 +391,12 @@ def _free_points(
     entry, point = entry[order], point[order]
     turn, last = np.searchsorted(entry, [np.arange(len(entries)), np.arange(1, len(entries) + 1)])
     while True:  # those whose point an earlier one has ask for their next one
-        guarded_user_call = np.flatnonzero(turn < last)
-        first = np.unique(point[turn[guarded_user_call]], return_index=True)[1]
-        lost = np.delete(guarded_user_call, first)
+        pending = np.flatnonzero(turn < last)
+        first = np.unique(point[turn[pending]], return_index=True)[1]
+        lost = np.delete(pending, first)
         if not len(lost):
             break
         turn[lost] += 1
     found = np.full(len(entries), -1)
-    found[guarded_user_call] = point[turn[guarded_user_call]]
+    found[pending] = point[turn[pending]]
     return found

@@ -130,7 +130,7 @@ def penalised_step(
     stuck = max(violations) > feasibility and sum(possible) > (1.0 - least) * sum(violations)
     while True:
         enough = [
-            _reduced(one, left, best, share, rounding) or one.largest_multiplier
+            _reduced(one, left, best, share, rounding) or one.has_largest_penalty
             for one, left, best in zip(soft, step.violations, possible, strict=True)
         ]
         if all(enough):

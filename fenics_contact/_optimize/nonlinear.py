@@ -245,7 +245,7 @@ class SoftConstraint:
         return self.penalty * (self.bundle.measures - self.value)
 
     @property
-    def largest_multiplier(self) -> bool:
+    def has_largest_penalty(self) -> bool:
         """Whether the penalty is as large as it may be."""
         return self.penalty >= 0.999 * self._most
 
