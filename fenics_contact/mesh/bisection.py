@@ -73,10 +73,8 @@ def _bisected(
     """Return a partition into ``parts`` subdomains, and more where one has too many cells.
 
     Where cells are refined near a point, subdomains of the same weight may have very different numbers of
-    cells. What has more than ``heavy`` times ``usual`` of them is cut on, into as many parts as are usual.
-
-    `faces`: pairs of cells that share a face, and its area, see `face_areas`; `power`: of areas, and of
-    weights: zero counts faces and cells, whatever their size.
+    cells: what has more than ``heavy`` times ``usual`` of them is cut on. `power`: of areas and weights; zero
+    counts faces and cells, whatever their size.
     """
     check_parts(mesh, parts)
     if mesh.cuts:
@@ -100,9 +98,7 @@ def _bisected(
 class _Cut:
     """A cut of a piece normal to one direction.
 
-    Attributes:
-        order: Its cells along the direction, (n,).
-        cost: Area, increased if the cut is uneven.
+    `cost`: area, increased if the cut is uneven.
     """
 
     order: np.ndarray
@@ -115,14 +111,8 @@ class _Cut:
 class _Piece:
     """A piece of a mesh that is to become several subdomains.
 
-    Attributes:
-        cells: Its cells, (n,).
-        places: Layers or coordinates of their centres, (n, 3 | 2).
-        orders: The cells in the order of each of these, (n,) each.
-        turned: Whether it may be cut normal to its principal axes.
-        weights: Weight of each cell, (n,), with 1 for a subdomain.
-        pairs: Pairs of cells that share a face, in its own numbering, (n_pairs, 2).
-        areas: Areas of these faces, (n_pairs,).
+    `turned`: whether it may be cut normal to its principal axes; `weights`: weight of each cell, with 1 for a
+    subdomain.
     """
 
     cells: np.ndarray
@@ -251,12 +241,8 @@ _NODES_PER_CELL = {
 def target_parts(mesh: BodyMesh, nodes: float | None = None) -> int:
     """Choose the number of subdomains so that each has about a given number of nodes.
 
-    A subdomain that would have m nodes inside a large mesh has (m^(1/d) + 1)^d once it is torn out.
-
-    `nodes`: nodes of one subdomain, at least 2^d; unless given 700 in 3D and 1000 in 2D, about 2000
-    displacements.
-
-    Returns number of subdomains, at least 1 and at most the number of cells.
+    A subdomain that would have m nodes inside a large mesh has (m^(1/d) + 1)^d once it is torn out. `nodes`:
+    nodes of one subdomain, at least 2^d; unless given 700 in 3D and 1000 in 2D, about 2000 displacements.
     """
     nodes = TARGET_NODES[mesh.dim] if nodes is None else nodes
     if not 2**mesh.dim <= nodes < np.inf:
@@ -284,14 +270,10 @@ def default_partition(
     number near the target that can be halved often is chosen: halves are similar, so that their matrices
     share a pattern. The cuts are those of `bisection_partition`; subdomains with three times the usual number
     of cells, as where a mesh is refined near a point, are cut again. Only a body with fewer cells than ranks
-    has fewer subdomains than there are ranks.
-
-    `lean`: whether memory matters more than products. Subdomains are then smaller, and cuts cross fewer faces
-    rather than less area: in graded bodies they are less compact, but their dense matrices take half as much.
-    `lean_nodes`: nodes of one in space then; with fewer, tables of interfaces take what matrices save.
-
-    Returns (n_cells,) subdomain numbers, every subdomain connected through faces; the same on
-    every rank.
+    has fewer subdomains than there are ranks. `lean`: whether memory matters more than products. Subdomains
+    are then smaller, and cuts cross fewer faces rather than less area: in graded bodies they are less
+    compact, but their dense matrices take half as much. `lean_nodes`: nodes of one in space then; with fewer,
+    tables of interfaces take what matrices save.
     """
     check_count(ranks, "ranks")
     faces = None if mesh.cuts else face_areas(mesh)

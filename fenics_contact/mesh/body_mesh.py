@@ -98,9 +98,8 @@ def checked_cells(cells: ArrayLike, n_nodes: int, dim: int) -> np.ndarray:
 def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str, given: bool = False) -> None:
     """Reject a mesh with an inverted or degenerate cell, or so far from the origin that rounding bends cells.
 
-    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, nodes of a cell); `given`:
-    whether the mesh is one that others made, of which Gauss points decide: a corner that is turned inside out
-    is reported, as other programs solve such meshes, too.
+    `given`: whether the mesh is one that others made, of which Gauss points decide: a corner that is turned
+    inside out is reported, as other programs solve such meshes, too.
     """
     thick = thickness(points, cells)
     inverted = np.flatnonzero(thick <= 0.0)
@@ -208,10 +207,7 @@ def checked_node_sets(
 
 
 def check_hanging(hanging: HangingNodes, points: np.ndarray, n_cells: int) -> None:
-    """Reject hanging nodes that are not at the mean of masters which do not hang.
-
-    `points`: coordinates, (n_nodes, 3 | 2).
-    """
+    """Reject hanging nodes that are not at the mean of masters which do not hang."""
     if not hanging:
         return
     nodes, masters, levels = hanging.nodes, hanging.masters, hanging.levels
@@ -238,10 +234,7 @@ def check_hanging(hanging: HangingNodes, points: np.ndarray, n_cells: int) -> No
 
 
 def check_centres(centres: Centres, points: np.ndarray) -> None:
-    """Reject centres that do not lie where the nodes are that they follow.
-
-    `points`: coordinates, (n_nodes, 3 | 2).
-    """
+    """Reject centres that do not lie where the nodes are that they follow."""
     away = np.abs(points - centres.placed(points)).max(axis=1)
     if (worst := float(away.max())) > LAST_BITS * coordinate_rounding(points):
         raise InvalidInputError(
@@ -254,9 +247,8 @@ def check_centres(centres: Centres, points: np.ndarray) -> None:
 class Cut:
     """Faces of cells along which a mesh is cut.
 
-    Attributes:
-        pairs: Node behind the cut and node before it, at the same place, shape (n, 2).
-        facets: The faces, outward of the cells before the cut, shape (n_facets, nodes of a face).
+    `pairs`: node behind the cut and node before it, at the same place; `facets`: the faces, outward of the
+    cells before the cut.
     """
 
     pairs: np.ndarray

@@ -251,10 +251,7 @@ OF_THE_FILE = (
 
 
 def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
-    """Return the type of cells; for four nodes it depends on the dimension.
-
-    `cells`: node numbers, (n_cells, nodes of a cell).
-    """
+    """Return the type of cells; for four nodes it depends on the dimension."""
     for cell in CELL_TYPES.values():
         if cell.dim == dim and cells.ndim == 2 and cells.shape[1] == cell.nodes.shape[0]:
             return cell
@@ -282,22 +279,12 @@ _OTHERS = ("interval", "quadrilateral", "hexahedron")
 
 
 def shape_values(cell: CellType, positions: np.ndarray) -> np.ndarray:
-    """Evaluate the shape functions.
-
-    `positions`: reference coordinates, (m, dim).
-
-    The result has shape (m, nodes of a cell).
-    """
+    """Evaluate the shape functions at reference coordinates, (m, nodes of a cell)."""
     return _tabulated(cell, positions, 0)[0]
 
 
 def shape_gradients(cell: CellType, positions: np.ndarray) -> np.ndarray:
-    """Evaluate the gradients of the shape functions in reference coordinates.
-
-    `positions`: reference coordinates, (m, dim).
-
-    The result has shape (m, nodes of a cell, dim).
-    """
+    """Evaluate the gradients of the shape functions in reference coordinates, (m, nodes, dim)."""
     return np.moveaxis(_tabulated(cell, positions, 1)[1:], 0, 2)
 
 
@@ -306,9 +293,8 @@ def quadrature(cell: CellType, degree: int | None = None) -> tuple[np.ndarray, n
     """Return a rule that integrates squares of shape functions, and the Jacobian of curved cells, exactly.
 
     Two Gauss points per direction on linear and three on quadratic edges, quadrilaterals and hexahedra; rules
-    of degree two on linear and of degree five on quadratic simplices.
-
-    Returns reference coordinates, (m, dim), and weights that add up to the reference volume, (m,).
+    of degree two on linear and of degree five on quadratic simplices. Its weights add up to the reference
+    volume.
     """
     import basix
 

@@ -108,10 +108,8 @@ def kept_valid(
     """Return the images of nodes, but nearer to straight positions where cells would be nearly inverted.
 
     On coarse cells of a strongly curved or graded body some would. Nodes inside come first, then those on the
-    boundary, and those of surfaces that have shapes last.
-
-    `images`, `straight`: shape (n_nodes, dim); `cells`: node numbers; `surfaces`: facets of these surfaces;
-    `least`: smallest thickness of a cell relative to that between straight positions.
+    boundary, and those of `surfaces`, which have shapes, last. `least`: smallest thickness of a cell relative
+    to that between straight positions.
     """
     points, thin = images.copy(), least * thickness(straight, cells)
     worse = np.flatnonzero(thickness(points, cells) < thin)
@@ -137,11 +135,7 @@ def kept_valid(
 
 
 def check_chart(chart: Chart, points: np.ndarray, farthest: float = 1e-9) -> None:
-    """Reject a chart of which nodes are no images.
-
-    `points`: their coordinates, (n_nodes, dim); `farthest`: largest distance of a node from its image,
-    relative to the extent of the mesh.
-    """
+    """Reject a chart of which nodes are no images, or too far from them for the extent of the mesh."""
     if np.shape(chart.coordinates) != points.shape:
         raise InvalidInputError(
             f"Chart.coordinates must have shape {points.shape}, those of every node, got "

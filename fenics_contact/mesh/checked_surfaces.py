@@ -79,10 +79,7 @@ def checked_surfaces(
 
 
 def _checked_parts(name: str, facets: np.ndarray, boundary: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return checked facets of a body of several shapes of cells: triangles and others, each by their nodes.
-
-    Where all are triangles, they have 3 or 6 nodes each.
-    """
+    """Return checked facets, given by nodes, of a body with both triangles and others."""
     mine, result = is_triangle(facets), np.empty_like(facets)
     for some, there in ((mine, triangles), (~mine, ~triangles)):
         if some.any():

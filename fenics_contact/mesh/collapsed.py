@@ -40,15 +40,9 @@ from fenics_contact.mesh.cell_types import (
 class Shape:
     """A shape of cells.
 
-    Attributes:
-        name: That of linear cells.
-        plural: For messages.
-        dim: Dimension.
-        onto: Own vertex of each vertex of the hexahedron (quadrilateral).
-        edges: Vertices of the edges, in VTK's order of their midpoints.
-        squares: Vertices of the faces with four, in VTK's order of their centres.
-        centre: Whether quadratic cells have a node in the middle.
-        mirrored: The vertices of the cell with the opposite sign of its Jacobian.
+    `onto`: own vertex of each vertex of the hexahedron (quadrilateral); `edges`: vertices of the edges, in
+    VTK's order of their midpoints; `squares`: vertices of the faces with four, in VTK's order of their
+    centres; `mirrored`: the vertices of the cell with the opposite sign of its Jacobian.
     """
 
     name: str
@@ -191,11 +185,8 @@ def shape_of(count: int, dim: int) -> Shape:
 class Collapse:
     """How cells of a shape are those of the hexahedron.
 
-    Attributes:
-        shape: The shape.
-        columns: Own node in each place of the hexahedron; a vertex where it has none, shape (8 | 27,).
-        places: A place of each own node, shape (k,).
-        values: T, shape (8 | 27, k).
+    `columns`: own node in each place of the hexahedron; a vertex where it has none; `places`: a place of each
+    own node; `values`: T.
     """
 
     shape: Shape
@@ -350,18 +341,12 @@ def by_shape(cells: np.ndarray, dim: int) -> dict[str, tuple[np.ndarray, np.ndar
 
 
 def places_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return the positions of the nodes of every cell as a hexahedron, (n_cells, nodes of a cell, dim).
-
-    `points`: coordinates, (n_nodes, dim).
-    """
+    """Return the positions of the nodes of every cell as a hexahedron, (n_cells, nodes of a cell, dim)."""
     return as_hexahedra(points[cells], cells, points.shape[1])
 
 
 def as_hexahedra(values: np.ndarray, cells: np.ndarray, dim: int) -> np.ndarray:
-    """Return values at the places of cells, (n_cells, k, ...), as those at the nodes of hexahedra.
-
-    `cells`: node numbers, (n_cells, k).
-    """
+    """Return values at the nodes of cells, (n_cells, k, ...), as those at the nodes of hexahedra."""
     result = values
     kind = cell_type_of(cells, dim)
     if kind.order == 1:
@@ -377,10 +362,8 @@ def as_hexahedra(values: np.ndarray, cells: np.ndarray, dim: int) -> np.ndarray:
 def expanded(cells: np.ndarray, n_nodes: int, dim: int) -> tuple[np.ndarray, sp.csr_matrix] | None:
     """Return hexahedra all of whose nodes differ in place of several shapes; None where all are whole.
 
-    Whole cells keep sharing nodes, which come first in their order; others have nodes of their own.
-
-    Returns node numbers, (n_cells, 8 | 27), and E, values at these nodes by those at the given ones, shape
-    (n, n_nodes).
+    Whole cells keep sharing nodes, which come first in their order; others have nodes of their own. The
+    matrix maps values at the given nodes to these.
     """
     groups = shapes_in(cells, dim)
     if groups is None:

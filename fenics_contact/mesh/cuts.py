@@ -25,8 +25,6 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
 
     Cells keep their numbers, surfaces and shapes their names. Coordinates are given for the nodes before or
     after the cut, see `BodyMesh.moved`. Centres that followed other nodes do so on both sides.
-
-    `before`, `behind`: cells on both sides, shape (n,) each.
     """
     require_none(mesh.hanging, "a section", "refine no cells there, or take simplices")
     shared = nodes_between(mesh, before, behind)
@@ -99,10 +97,7 @@ def sewn(mesh: BodyMesh) -> BodyMesh:
 
 
 def pieces(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
-    """Return a partition whose subdomains no cut crosses; the same one where none does.
-
-    `partition`: subdomain of each cell, shape (n_cells,).
-    """
+    """Return a partition whose subdomains no cut crosses; the same one where none does."""
     if not mesh.cuts or np.shape(partition) != (mesh.n_cells,):
         return partition
     piece = _joined(mesh, partition)

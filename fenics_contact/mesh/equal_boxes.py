@@ -27,30 +27,18 @@ def equal_boxes(
     slender: float = 1.1,
     longest: float = 1.5,
 ) -> np.ndarray | None:
-    """Cut a structured mesh into boxes of cells, if enough of them have the same shape.
+    """Cut a structured mesh into boxes of cells, if enough of them have the same shape, else return None.
 
     Of the numbers of boxes along the directions those are taken for which
 
         c · exp(size · |ln(n / target)| + uneven · m),   c = surfaces of all / (2d n^(1/d) volume^(1 − 1/d))
 
+
     is least: compact ones (cubes have c = 1, boxes of 2 : 2 : 1 have 1.06), of a size that is suitable, and
-    equal; m counts the directions in which they differ by a layer of cells.
-
-    Args:
-        mesh: Any mesh.
-        target: Number of boxes of suitable size.
-        least: Smallest number of boxes.
-        faces: Pairs of cells that share a face, and its area, if known, see `face_areas`.
-        members: How many boxes there must be for each shape.
-        near: Factor by which the number of boxes may miss the target.
-        size: Weight of the size.
-        uneven: Weight of a direction in which boxes differ.
-        slender: Largest c.
-        longest: Largest second moment of any box, relative to that of a cube of its volume (2 : 1 : 1 has
-            1.26): where cells are graded, boxes of as many cells are long somewhere.
-
-    Returns:
-        (n_cells,) numbers of the boxes as `box_partition` gives them; None where there are no such boxes.
+    equal; m counts the directions in which they differ by a layer of cells. `members`: how many boxes there
+    must be for each shape; `near`: factor by which the number of boxes may miss the target; `slender`:
+    largest c; `longest`: largest second moment of any box, relative to that of a cube of its volume (2 : 1 :
+    1 has 1.26): where cells are graded, boxes of as many cells are long somewhere.
     """
     first, last = max(least, members, target / near), near * target
     if mesh.grid is None or mesh.hanging or mesh.cuts or first > last:

@@ -37,38 +37,24 @@ NOTHING = 1e-10
 
 
 def coordinate_rounding(points: np.ndarray) -> float:
-    """Return the largest distance of nodes that are meant to coincide, [length].
-
-    `points`: coordinates, (n_nodes, 3 | 2).
-    """
+    """Return the largest distance of nodes that are meant to coincide, [length]."""
     return float(LAST_BITS * np.finfo(np.float64).eps * np.abs(points).max(initial=0.0))
 
 
 def computed_rounding(points: np.ndarray) -> float:
-    """Return how far off a length may be that a few operations make of coordinates, [length].
-
-    `points`: coordinates, (n_nodes, 3 | 2).
-    """
+    """Return how far off a length may be that a few operations make of coordinates, [length]."""
     return OPERATIONS * coordinate_rounding(points)
 
 
 def coincident_pairs(points: np.ndarray, tolerance: float = NOTHING) -> np.ndarray:
-    """Return the pairs of nodes that coincide.
-
-    `points`: coordinates, (n_nodes, 3 | 2).
-
-    Returns (n_pairs, 2) node numbers, each pair and the list ascending.
-    """
+    """Return the pairs of nodes that coincide, each pair and the list ascending."""
     reach = tolerance * float(np.linalg.norm(np.ptp(points, axis=0))) + coordinate_rounding(points)
     pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
     return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], dtype=np.int64)
 
 
 def check_no_coincident_nodes(points: np.ndarray) -> None:
-    """Reject a mesh with coincident nodes.
-
-    `points`: coordinates, (n_nodes, 3 | 2).
-    """
+    """Reject a mesh with coincident nodes."""
     pairs = coincident_pairs(points)
     if pairs.shape[0] == 0:
         return
@@ -119,13 +105,7 @@ def merge_duplicate_nodes(
 
 
 def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
-    """List the faces of every cell, outward.
-
-    `cells`: node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra or (dim=2) quadrilaterals,
-    (n_cells, 3) for triangles; quadratic ones have 27, 10, 9 or 6.
-
-    Returns node numbers of the faces, (n_cells, faces of a cell, nodes of a face).
-    """
+    """List the faces of every cell, outward, (n_cells, faces of a cell, nodes of a face)."""
     faces = cells[:, cell_type_of(cells, dim).faces]
     return triangles_last(faces.reshape(-1, faces.shape[2])).reshape(faces.shape)
 
@@ -136,12 +116,7 @@ def corners_of(faces: np.ndarray, dim: int) -> np.ndarray:
 
 
 def face_keys(faces: np.ndarray) -> np.ndarray:
-    """Reduce faces to two integers each that do not depend on the order of the nodes.
-
-    `faces`: node numbers, (n, 4 | 3 | 2) or of quadratic cells (n, 9 | 6 | 3), all below 2**31.
-
-    Returns (n, 2) int64; equal rows belong to faces with equal nodes.
-    """
+    """Reduce faces to two integers each that do not depend on the order of the nodes, all below 2**31."""
     nodes = np.zeros((faces.shape[0], 4), dtype=np.int64)
     corners = faces[:, : 3 if faces.shape[1] == 6 else 4]
     nodes[:, : corners.shape[1]] = np.sort(corners, axis=1)
@@ -154,10 +129,7 @@ def face_keys(faces: np.ndarray) -> np.ndarray:
 
 
 def number_faces(faces: np.ndarray) -> np.ndarray:
-    """Number faces so that those with the same nodes have the same number.
-
-    Returns (n,) int64 consecutive numbers from 0.
-    """
+    """Number faces so that those with the same nodes have the same number."""
     return _numbered(face_keys(faces))
 
 
@@ -267,7 +239,7 @@ def narrowed(faces: np.ndarray) -> np.ndarray:
 
 
 def in_columns(values: np.ndarray, width: int) -> np.ndarray:
-    """Return values at the nodes of triangles, (n, 3 | 6), at those of faces of so many; others as they are.
+    """Return values at nodes of triangles as those at nodes of wider faces; others as they are.
 
     They are zero where these repeat a node.
     """
@@ -303,8 +275,6 @@ def _on_larger(faces: np.ndarray, hanging: HangingNodes) -> tuple[np.ndarray, np
     """Return which faces lie on larger ones, and on which, shape (n,) each.
 
     With its hanging nodes replaced by their masters, a face on a larger one has the nodes of that.
-
-    `faces`: faces of linear cells that belong to one cell, (n_faces, k).
     """
     size = faces.shape[1]
     row_of = np.full(int(faces.max(initial=0)) + 1, -1)
@@ -325,7 +295,7 @@ def shared_faces(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the faces that two cells share; where cells have different sizes, those of the smaller ones.
 
-    Returns the faces, outward of the first cell, (n, nodes of a face), and their two cells, (n, 2).
+    Returns the faces, outward of the first cell, and their two cells.
     """
     numbers, of_cell = _numbers_of_faces(cells, dim), len(cell_type_of(cells, dim).faces)
     counts = np.bincount(numbers)
@@ -353,12 +323,7 @@ def neighbours(cells: np.ndarray, dim: int = 3, hanging: HangingNodes = NO_HANGI
 
 
 def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
-    """Find each face among the candidates, whatever its orientation.
-
-    `faces`: node numbers, (n, k); `candidates`: node numbers, (m, k'), all different faces.
-
-    Returns (n,) positions in ``candidates``, -1 where there is none.
-    """
+    """Find each face among different candidates, whatever its orientation; −1 where there is none."""
     numbers = _numbered(np.concatenate([face_keys(candidates), face_keys(faces)]))
     position = np.full(numbers.max(initial=-1) + 1, -1, dtype=np.int64)
     position[numbers[: candidates.shape[0]]] = np.arange(candidates.shape[0])
@@ -368,10 +333,7 @@ def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
 def orient(
     cells: np.ndarray, facets: np.ndarray, dim: int = 3, hanging: HangingNodes = NO_HANGING
 ) -> np.ndarray:
-    """Return boundary facets in the cells' order: cyclic and outward.
-
-    `facets`: node numbers, (n, nodes of a face), the corners in any order.
-    """
+    """Return boundary facets, whose corners are in any order, in the cells' order: cyclic and outward."""
     boundary, _ = boundary_faces(cells, dim, hanging)
     matches = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
     if np.any(matches < 0):
@@ -387,10 +349,6 @@ def start_at_smallest(facets: np.ndarray) -> np.ndarray:
     """Rotate every facet so that it starts at its smallest node, so that equal cycles become equal rows.
 
     Edges stay as they are: both directions would be one cycle, but differ in the side the normal points to.
-
-    `facets`: node numbers in cyclic order, (n, k).
-
-    Returns the rotated facets, (n, k).
     """
     k = facets.shape[1]
     if k == 2:
@@ -405,12 +363,6 @@ def vector_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     The vector area of a bilinear facet is half the cross product of its diagonals, exactly. In two dimensions
     it is the chord rotated clockwise by a right angle, also for curved edges. Quadratic facets in space are
     treated as four linear ones. Over a closed surface the vector areas add up to zero.
-
-    `points`: coordinates, (n_nodes, 3 | 2); `facets`: node numbers in cyclic order, (n, 4 | 3) or quadratic
-    (n, 9 | 6), or edges with the body on their left, (n, 2 | 3).
-
-    Returns (n, 3 | 2) vectors: normal times area (for a warped facet: of its projection along
-    the mean normal) or length.
     """
     pieces = FACET_TYPES[facets.shape[1], points.shape[1]].pieces
     if points.shape[1] == 3 and len(pieces) > 1:

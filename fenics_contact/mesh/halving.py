@@ -25,8 +25,6 @@ def halved(mesh: BodyMesh, chosen: np.ndarray) -> Parts:
     Cells that share a point differ by one level at most, so that no master of a hanging node hangs. Where a
     surface is so curved that cells between nodes on its shape and hanging nodes on its facets are inverted,
     the larger cells beside them are halved, too.
-
-    `chosen`: numbers of the marked cells.
     """
     kind = _HALVED[mesh.dim]
     while True:
@@ -41,10 +39,7 @@ def halved(mesh: BodyMesh, chosen: np.ndarray) -> Parts:
 class Parts:
     """Cells of which some were halved.
 
-    Attributes:
-        parents: The coarse cell of each, ascending, shape (n_cells,).
-        positions: Where in its parent each node of each cell lies, shape (n_cells, nodes of a cell, dim).
-        split: Whether each coarse cell was.
+    `positions`: where in its parent each node of each cell lies.
     """
 
     points: np.ndarray
@@ -94,7 +89,7 @@ class Parts:
 
 
 def _entities(kind: CellType, cells: np.ndarray) -> np.ndarray:
-    """Return the corners of edges and faces of cells, (n_cells, n, 2 | 4), each end of edges twice in space.
+    """Return the corners of edges and faces of cells, each end of edges twice in space.
 
     In the order of the nodes that a quadratic cell has there.
     """
@@ -134,8 +129,8 @@ def _balanced(mesh: BodyMesh, kind: CellType, levels: np.ndarray, chosen: np.nda
 def _new_nodes(mesh: BodyMesh, kind: CellType, large: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number the nodes in the middle of edges, faces and cells, those that were there by their old numbers.
 
-    Returns the corners between which new nodes lie, edges' and faces' as `_entities`, in the order of their
-    numbers, and the numbers in each cell, (n_large, n).
+    Returns the corners between which new nodes lie, in the order of their numbers, and the numbers in each
+    cell.
     """
     there = _entities(kind, mesh.cells[large])
     flat = there.reshape(-1, there.shape[2])
@@ -210,7 +205,6 @@ def _placed(
     """Return coordinates: new nodes and those that hang no more lie on the shapes of their surfaces.
 
     Others around them follow, see `smoothed_along`; nodes that hang lie at the mean of their masters.
-
     `numbers`: all nodes of the halved cells, and the refined cells.
     """
     nodes, cells = numbers

@@ -14,9 +14,7 @@ from fenics_contact.errors import InvalidInputError
 class DependentNodes:
     """Nodes whose displacement is a combination of that of others, u_h = Σ w_j u_j.
 
-    Attributes:
-        nodes: Their numbers, ascending, shape (n,).
-        masters: The nodes that each follows, none of which depends on others, shape (n, k).
+    `masters`: the nodes that each follows, none of which depends on others.
     """
 
     nodes: np.ndarray
@@ -73,20 +71,17 @@ class HangingNodes(DependentNodes):
     levels: np.ndarray
 
     def filled_in(self, values: np.ndarray, facets: np.ndarray, known: np.ndarray) -> np.ndarray:
-        """Return nodal values, those of hanging nodes of facets that are not known by their masters'.
-
-        `values`: shape (n_nodes, ...); `facets`: node numbers; `known`: numbers of nodes with values.
-        """
+        """Return nodal values, those of hanging nodes of facets that are not known by their masters'."""
         nodes, result = np.unique(facets), values.copy()
         fill = self.filled(nodes, np.isin(nodes, known))
         result[nodes] = (fill @ values[nodes].reshape(len(nodes), -1)).reshape(values[nodes].shape)
         return result
 
     def filled(self, nodes: np.ndarray, known: np.ndarray) -> sp.csr_matrix:
-        """Return what fills in values at hanging nodes among some nodes, shape (n_nodes, n_nodes).
+        """Return the matrix that fills in values at hanging nodes among some nodes, numbered ascending.
 
-        `nodes`: numbers, ascending; `known`: marks of those with values, and of others that stay as they are.
-        So do those with masters that are not among the nodes.
+        `known`: marks of those with values, and of others that stay as they are, as do those whose masters
+        are not among the nodes.
         """
         mine = np.isin(self.nodes, nodes[~known]) & np.isin(self.masters, nodes).all(axis=1)
         place = np.searchsorted(nodes, self.nodes[mine])

@@ -17,11 +17,8 @@ HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 class LinearFacets:
     """Linear facets, facet by facet.
 
-    Attributes:
-        rows: Their nodes, shape (n, corners).
-        owner: Facet that each is a piece of, ascending, shape (n,).
-        number: Which of its pieces it is, shape (n,); of quadrilaterals among triangles each linear one has
-            two in turn, see `HALVES`.
+    `owner`: facet that each is a piece of, ascending; `number`: which of its pieces it is; of quadrilaterals
+    among triangles each linear one has two in turn, see `HALVES`.
     """
 
     rows: np.ndarray
@@ -30,10 +27,7 @@ class LinearFacets:
 
 
 def linear_facets(facets: np.ndarray, dim: int) -> LinearFacets:
-    """Cut facets into linear ones.
-
-    `facets`: node numbers as in `BodyMesh.surfaces`, (n_facets, nodes of a facet).
-    """
+    """Cut facets into linear ones."""
     if not has_both(facets):
         pieces = FACET_TYPES[facets.shape[1], dim].pieces
         rows = facets[:, pieces].reshape(-1, pieces.shape[1])

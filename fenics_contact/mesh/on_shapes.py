@@ -25,8 +25,7 @@ def on_shapes(
 ) -> np.ndarray:
     """Return coordinates with new nodes of surfaces on their shapes, all other new ones drawn along.
 
-    `straight`: coordinates with all nodes on facets, shape (n_nodes, dim); `cells`, `surfaces`: node numbers,
-    linear or quadratic; `new`: marks of the nodes that move; `hanging`: nodes that follow their masters.
+    `straight`: coordinates with all nodes on facets; `new`: marks of the nodes that move.
     """
     moved, placed, along = put_on_shapes(straight, cells, surfaces, shapes, new, hanging)
     if np.array_equal(moved, straight):
@@ -48,10 +47,8 @@ def put_on_shapes(
     """Return coordinates with movable nodes of surfaces on their shapes.
 
     A node of several shapes is put on all of them, one beside a plane part of the boundary stays in that.
-    Joined shapes are given by their parts, see `with_parts`.
-
-    Returns coordinates, which nodes lie on shapes, shape (n_nodes,), and projections onto the directions in
-    which other nodes of the boundary may move, shape (n_nodes, dim, dim); arguments as for `on_shapes`.
+    Joined shapes are given by their parts, see `with_parts`. Returns also which nodes lie on shapes, and
+    projections onto the directions in which other nodes of the boundary may move.
     """
     dim, placed = points.shape[1], np.zeros(len(points), dtype=bool)
     if not any(movable[surfaces[name]].any() for name in shapes):
@@ -113,9 +110,8 @@ def _part_of(shape: Joined, mesh: BodyMesh, facets: np.ndarray, off: float = 1e-
     """Return the part of a joined shape on which each facet lies with all its nodes, shape (n_facets,).
 
     Of several the one whose normal and place are those of its middle: near a ridge the middle of a coarse
-    facet may be nearer to the part beyond it.
-
-    `off`: distance of nodes from their shape, relative to the size of the facet.
+    facet may be nearer to the part beyond it. `off`: distance of nodes from their shape, relative to the size
+    of the facet.
     """
     points, parts = mesh.points[facets], shape.shapes
     size = np.linalg.norm(np.ptp(points, axis=1), axis=1)[:, None]
@@ -143,10 +139,8 @@ def _onto(
 
     Newton's method with the smallest step, x − (N P)⁺ d(x), with the normals N as rows and the projection P.
     Where they touch at so small an angle that this does not find their intersection, as a fillet does, the
-    closest point of a shape that is no plane.
-
-    `along`: P, shape (n, dim, dim); `parallel`: sine of the smallest angle between shapes that intersect;
-    `farthest`: largest movement relative to the distance from the shapes.
+    closest point of a shape that is no plane. `along`: P; `parallel`: sine of the smallest angle between
+    shapes that intersect; `farthest`: largest movement relative to the distance from the shapes.
     """
 
     def away(there: np.ndarray) -> np.ndarray:
@@ -172,11 +166,10 @@ def _onto(
 def _directions(points: np.ndarray, boundary: np.ndarray, gentle: float = 0.9) -> np.ndarray:
     """Return projections onto the directions in which nodes of a boundary may move, (n_nodes, dim, dim).
 
-    Nodes of plane parts stay in these, those of gently curved ones are free.
-
-    `boundary`: its linear facets without shapes; `gentle`: cosine of the angle between normals of facets
-    around a node and their mean from which on the boundary is gently curved there; it is so at a node if it
-    is at all corners of the facets around.
+    Nodes of plane parts stay in these, those of gently curved ones are free. `boundary`: its linear facets
+    without shapes; `gentle`: cosine of the angle between normals of facets around a node and their mean from
+    which on the boundary is gently curved there; it is so at a node if it is at all corners of the facets
+    around.
     """
     count, dim = points.shape
     areas = vector_areas(points, boundary)

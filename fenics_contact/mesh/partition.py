@@ -89,10 +89,6 @@ def merge_pieces(
 
     The largest piece of each subdomain stays; every other piece goes to the subdomain with whose largest
     piece it shares most faces, those that touch none in a later round.
-
-    `partition`: (n_cells,) subdomain numbers; `pairs`: of cells that share a face, if known, (n_pairs, 2).
-
-    Returns (n_cells,) subdomain numbers, the same subdomains.
     """
     partition = _checked_partition(mesh, partition).copy()
     pairs = neighbours(mesh.cells, mesh.dim, mesh.hanging) if pairs is None else pairs
@@ -144,8 +140,6 @@ def kept_together(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.n
     """Return a partition that splits no siblings at hanging nodes; the same one where it splits none.
 
     They go to the subdomain that has most of them. Subdomains that lose all their cells vanish.
-
-    `partition`: subdomain of each cell, shape (n_cells,).
     """
     if not mesh.hanging or np.shape(partition) != (mesh.n_cells,):
         return partition
@@ -169,10 +163,7 @@ def _named(body: str) -> str:
 
 
 def check_one_piece(mesh: BodyMesh, body: str = "", pairs: np.ndarray | None = None) -> None:
-    """Reject a mesh that is not connected through faces, other than where a section cuts it.
-
-    `pairs`: of cells that share a face, if known, (n_pairs, 2).
-    """
+    """Reject a mesh that is not connected through faces, other than where a section cuts it."""
     mesh, pairs = (closed(mesh), None) if mesh.cuts else (mesh, pairs)
     pairs = neighbours(mesh.cells, mesh.dim, mesh.hanging) if pairs is None else pairs
     piece, owner = _face_pieces(mesh, np.zeros(mesh.n_cells, dtype=np.int64), pairs)
@@ -185,10 +176,7 @@ def check_one_piece(mesh: BodyMesh, body: str = "", pairs: np.ndarray | None = N
 
 
 def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> None:
-    """Reject a partition with a subdomain that is empty or not connected through faces.
-
-    `partition`: (n_cells,) subdomain numbers.
-    """
+    """Reject a partition with a subdomain that is empty or not connected through faces."""
     partition = _checked_partition(mesh, partition)
     _, owner = _face_pieces(mesh, partition, neighbours(mesh.cells, mesh.dim, mesh.hanging))
     pieces = np.bincount(owner)

@@ -18,12 +18,7 @@ from fenics_contact.mesh.quality import jacobians
 
 
 def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
-    """Drop the constant third coordinate of a plane mesh.
-
-    `points`: coordinates, (n_nodes, 3 | 2).
-
-    Returns coordinates, (n_nodes, 2).
-    """
+    """Drop the constant third coordinate of a plane mesh."""
     if points.shape[1] == 2:
         return points
     extent = np.ptp(points[used], axis=0)
@@ -38,9 +33,7 @@ def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
 def turned_counter_clockwise(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Reverse the cells of one plane surface if all of them run clockwise: its normal was chosen as -z.
 
-    `points`: coordinates, (n_nodes, 2); `cells`: node numbers, (n_cells, nodes of a cell).
-
-    Returns the cells; unchanged if only some run clockwise, which is a mistake in the mesh.
+    If only some do, it is a mistake in the mesh, and they stay.
     """
     shape = shape_of(cells.shape[1], 2)
     if np.all(jacobians(points, cells[:, : shape.corners]).max(axis=1) < 0.0):
@@ -49,10 +42,7 @@ def turned_counter_clockwise(points: np.ndarray, cells: np.ndarray) -> np.ndarra
 
 
 def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> np.ndarray:
-    """Reverse every cell with negative Jacobian, in meshes without a prescribed order of vertices.
-
-    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers in VTK order, (n_cells, nodes of a cell).
-    """
+    """Reverse every cell with negative Jacobian, in meshes without a prescribed order of vertices."""
     dim = points.shape[1]
     shape = shape_of(cells.shape[1], dim)
 

@@ -82,7 +82,7 @@ def with_more_nodes(
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """Number the nodes in the middle of vertices, once for all cells that share them, after `count` nodes.
 
-    Returns the vertices around them, groups of shape (n, k) in the order of the numbers, and the cells.
+    Returns groups of the vertices around them, in the order of the numbers, and the cells.
     """
     if shapes_in(cells, linear.dim) is not None:
         return _with_nodes_of_shapes(count, cells, linear.dim)

@@ -43,9 +43,7 @@ def with_centres(
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Add the centres of faces and cells that serendipity cells lack, once for all that share them.
 
-    `cells`: any name to node numbers in the order of VTK; `dim`: dimension of the cells.
-
-    Returns coordinates, new nodes at the end, and all cells, those that were complete as they were.
+    New nodes are at the end; cells that were complete stay as they were.
     """
     result, pending = dict(cells), {}
     for name, rows in cells.items():
@@ -74,10 +72,7 @@ def with_centres(
 
 
 def check_node_order(points: np.ndarray, cells: np.ndarray) -> None:
-    """Reject quadratic cells whose nodes are in another order than that of VTK.
-
-    `points`: coordinates, (n_nodes, 3 | 2) [length]; `cells`: node numbers, as of `BodyMesh`.
-    """
+    """Reject quadratic cells whose nodes are in another order than that of VTK."""
     dim = points.shape[1]
     several = len(by_shape(cells, dim)) > 1
     for _, own in by_shape(cells, dim).values():

@@ -45,8 +45,7 @@ def _critical_positions(cell: CellType) -> np.ndarray:
     """Points at which the Jacobian is evaluated.
 
     That of a quadrilateral is linear and determined by its vertices; that of a hexahedron by the lattice. On
-    quadratic cells, where no small set of values bounds it, it is evaluated at the nodes and the Gauss
-    points.
+    quadratic cells, where no small set of values bounds it, nodes and Gauss points are taken.
     """
     if cell.order == 2:
         return np.concatenate([cell.nodes, quadrature(cell)[0]])
@@ -58,15 +57,11 @@ AT_GAUSS_POINTS = np.zeros((0, 0))
 
 
 def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | None = None) -> np.ndarray:
-    """Evaluate the Jacobian determinant of the map from the reference cell.
+    """Evaluate the Jacobian determinant of the map from the reference cell, (n_cells, m).
 
-    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, nodes of a cell); `positions`:
-    reference coordinates, (m, 3 | 2), for all but linear simplices; unless given the 27 points of
-    `HEXAHEDRON_LATTICE`, the four vertices, or nodes and Gauss points of quadratic cells; `AT_GAUSS_POINTS`
-    for those at which cells of whatever shape are integrated. A linear simplex has one constant Jacobian: six
-    times its volume, or twice its area.
-
-    The result has shape (n_cells, m), or (n_cells, 1) for linear simplices, in units of volume (area).
+    `positions`: reference coordinates; unless given the 27 points of `HEXAHEDRON_LATTICE`, the four vertices,
+    or nodes and Gauss points of quadratic cells; `AT_GAUSS_POINTS` for those at which cells of whatever shape
+    are integrated. A linear simplex has one constant Jacobian, six times its volume or twice its area.
     """
     cell = cell_type_of(cells, points.shape[1])
     if cell.is_affine:
@@ -108,8 +103,8 @@ def _of_shapes(
 def jacobian_ratio(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return the ratio of the smallest to the largest Jacobian in every cell.
 
-    Returns (n_cells,) values in [-1, 1]: 1 for a parallelepiped, a parallelogram or a proper
-    simplex, 0 or less where the cell is degenerate or inverted.
+    It is 1 for a parallelepiped, a parallelogram or a proper simplex, 0 or less for a degenerate or inverted
+    cell.
     """
     values = jacobians(points, cells)
     largest = np.maximum(np.abs(values).max(axis=1), np.finfo(float).tiny)
@@ -157,8 +152,6 @@ def cell_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
     Two Gauss points in each direction integrate the quadratic Jacobian of a trilinear map, three that of a
     triquadratic one, of degree five.
-
-    Returns (n_cells,) volumes.
     """
     cell = cell_type_of(cells, points.shape[1])
     if cell.is_affine:
@@ -181,10 +174,7 @@ def node_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 def thickness(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | None = None) -> np.ndarray:
     """Return the smallest Jacobian of every cell over the area (length) of its bounding box's diagonal.
 
-    `positions`: as of `jacobians`.
-
-    Returns:
-        (n_cells,) [length]; 0 where a cell is inverted or flat, else a fraction of the diagonal.
+    It is 0 where a cell is inverted or flat, else a fraction of the diagonal, [length].
     """
 
     def of(cells: np.ndarray) -> np.ndarray:
@@ -212,10 +202,7 @@ FARTHEST = 0.1
 def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShape) -> np.ndarray:
     """Return the distance of a surface's nodes from a shape, relative to the shortest edge around each.
 
-    `points`: coordinates, (n_nodes, 3 | 2), [length]; `facets`: node numbers of facets, linear or quadratic,
-    (n_facets, nodes of a facet); `shape`: the shape.
-
-    One value for each node in ascending order of its number, (n,).
+    The nodes are in ascending order.
     """
     nodes, local = np.unique(facets, return_inverse=True)
     corners = corners_of(facets, points.shape[1])
@@ -233,12 +220,9 @@ def check_shapes(
     shapes: Mapping[str, SurfaceShape],
     hanging: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Reject shapes on which a surface does not lie.
+    """Reject shapes on which a surface does not lie; return the distances, see `distance_in_edges`.
 
-    `points`: coordinates, (n_nodes, 3 | 2), [length]; `shapes`: name of a surface to its shape; `hanging`:
-    nodes that lie on larger facets, not on shapes.
-
-    Returns the name of each of these surfaces to the distances of its nodes, see `distance_in_edges`.
+    `hanging`: nodes that lie on larger facets, not on shapes.
     """
     distances = {}
     for name, shape in shapes.items():
@@ -309,11 +293,7 @@ def _turning(shape: SurfaceShape) -> str:
 
 
 def similarity(points: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """Return rotation, translation and scale that move points, x -> scale · rotation x + translation.
-
-    `points`: old positions, (n, dim); `moved`: new positions, (n, dim).
-
-    The result has shape (dim, dim), (dim,) and a positive number; None if the motion is not a similarity.
+    """Return rotation R, translation t and scale s that move points, x -> s R x + t, or None.
 
     References:
         Umeyama, S.: Least-squares estimation of transformation parameters between two point patterns. IEEE

@@ -198,10 +198,7 @@ def _checked(
     parents: np.ndarray,
     positions: np.ndarray,
 ) -> Refinement:
-    """Return the refinement with regions and shapes of the coarse mesh, unless a cell is inverted.
-
-    `found`: coordinates, cells, surfaces and chart.
-    """
+    """Return the refinement with regions and shapes of the coarse mesh, unless a cell is inverted."""
     points, cells, surfaces, chart = found
     if chart is not None:
         straight = _mapped(mesh.points, mesh, parents, positions, cells)
@@ -310,10 +307,7 @@ def _spanned(ends: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def _mapped(
     values: np.ndarray, mesh: BodyMesh, parents: np.ndarray, positions: np.ndarray, cells: np.ndarray
 ) -> np.ndarray:
-    """Return values at the fine nodes, interpolated in the coarse cells; coordinates on curved ones.
-
-    `values`: at the coarse nodes, shape (n_nodes, dim); `cells`: the fine ones.
-    """
+    """Return values at the fine nodes, interpolated in the coarse cells; coordinates on curved ones."""
     result = np.empty((int(cells.max()) + 1, mesh.dim))
     weights = shape_values(CELL_TYPES[mesh.cell_type], positions.reshape(-1, mesh.dim))
     weights = weights.reshape(*cells.shape, -1)

@@ -20,10 +20,7 @@ _OF_A_CELL = np.concatenate([np.full(8, -0.25), np.full(12, 0.25)])
 
 
 def centres_of(cells: np.ndarray, dim: int) -> Centres:
-    """Return the centres of faces and cells, which follow the other nodes.
-
-    `cells`: node numbers of complete quadratic cells, (n_cells, nodes of a cell).
-    """
+    """Return the centres of faces and cells, which follow the other nodes."""
     if cell_type_of(cells, dim).order == 1:
         return NO_CENTRES
     width = 8 if dim == 2 else 20

@@ -22,12 +22,8 @@ def smoothed_along(
 
     They minimise Σ |dᵢ − dⱼ|² / lᵢⱼ² over the edges of cells with lengths l: along the short edges of thin
     layers all of these move, and with it what is as near to the surface as its new nodes are to each other.
-    Conjugate gradients: each iteration reaches one layer further.
-
-    `moved`: displacements, shape (n_nodes, dim); `free`: marks of the nodes that follow, all others keep
-    theirs; `straight`: coordinates without displacements; `cells`: node numbers of linear cells; `along`:
-    projections onto the directions in which nodes may move, shape (n_nodes, dim, dim); `hanging`: nodes that
-    follow their masters.
+    Conjugate gradients: each iteration reaches one layer further. `free`: marks of the nodes that follow, all
+    others keep theirs; `along`: projections onto the directions in which nodes may move.
     """
     joined = _joined(cells, straight)
     if hanging:

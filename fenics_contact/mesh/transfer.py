@@ -115,8 +115,8 @@ class MeshTransfer:
     def _nearest(self, kind: CellType, count: int, points: np.ndarray, decimals: int = 9) -> np.ndarray:
         """Return for the points of all cells the nearest one of the old cell in which each lies, numbered.
 
-        `count`: number of cells of the new mesh; `points`: reference coordinates, the same in all cells;
-        `decimals`: those of distances that count, so that rounding decides between no two points.
+        `points`: reference coordinates, the same in all cells; `decimals`: those of distances that count, so
+        that rounding decides between no two points.
         """
         every = np.repeat(np.arange(count), len(points))
         cells, positions = self.located(every, np.tile(points, (count, 1)))
