@@ -30,18 +30,12 @@ Label = str | int
 class TaggedMesh:
     """Points, cells and their labels.
 
-    Attributes:
-        source: Where it comes from, for messages: ``"file 'beam.msh'"``.
-        points: Coordinates, (n_nodes, 3 | 2).
-        cells: Cell type, by any name, to node numbers in VTK order, (n_cells, nodes of a cell), also of
-            prisms, pyramids and serendipity cells.
-        groups: Label to cell type to the numbers of its cells.
-        facets: Label to the corners of facets, arrays of (n, 4 | 3 | 2) node numbers; in any order.
-        words: Names of its labels, for messages: ``"physical volume"``, ``"physical surface"``.
-        node_sets: Label to node numbers, in any order: the facets on the boundary of a body all of whose
-            corners are among them.
-        point_sets: Label to node numbers of sets of single nodes.
-        coincident_nodes: Whether nodes of one body may coincide.
+    `source`: where it comes from, for messages: ``"file 'beam.msh'"``; `cells`: cell type, by any name, to
+    node numbers in VTK order, also of prisms, pyramids and serendipity cells; `groups`: label to cell type to
+    the numbers of its cells; `facets`: label to the corners of facets, in any order; `words`: names of its
+    labels, for messages: ``"physical volume"``; `node_sets`: label to nodes, of which the facets on a body's
+    boundary with all corners among them are meant; `point_sets`: label to single nodes; `coincident_nodes`:
+    whether nodes of one body may coincide.
     """
 
     source: str
@@ -62,11 +56,7 @@ class TaggedMesh:
 
 @dataclass(frozen=True)
 class BodyParts:
-    """The groups of a body.
-
-    Attributes:
-        regions: Their names as regions, or None for a body without regions.
-    """
+    """The groups of a body; without `regions` it has none."""
 
     labels: tuple[Label, ...]
     regions: tuple[str, ...] | None
@@ -76,8 +66,7 @@ class BodyParts:
 class SurfaceParts:
     """The parts of a surface.
 
-    Attributes:
-        facets: Corners of facets, arrays of (n, 4 | 3 | 2) node numbers.
+    `facets`: corners of facets, arrays of (n, 4 | 3 | 2) node numbers.
     """
 
     facets: Sequence[np.ndarray]
@@ -87,8 +76,8 @@ class SurfaceParts:
 def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
     """Resolve the caller's choice of bodies.
 
-    `bodies`: None for every group; a list of labels; or name of the body to a label, to a list of labels, or
-    to a mapping from the name of a region to a label.
+    It is None for every group; a list of labels; or name of the body to a label, to a list of labels, or to a
+    mapping from the name of a region to a label.
     """
     if bodies is None:
         bodies = list(mesh.groups)
@@ -109,10 +98,7 @@ def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
 
 
 def chosen_surfaces(mesh: TaggedMesh, surfaces: Any) -> dict[str, SurfaceParts]:
-    """Resolve the caller's choice of surfaces, in the same forms but without regions.
-
-    Returns the name of the surface to its facets and sets of nodes.
-    """
+    """Resolve the caller's choice of surfaces, in the same forms but without regions."""
     known = {**mesh.node_sets, **mesh.facets}
     if surfaces is None:
         surfaces = list(known)
@@ -159,9 +145,8 @@ Facets = Mapping[str, SurfaceParts]
 def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dict[str, BodyMesh]:
     """Build bodies from a mesh with labels.
 
-    Every body has its own nodes: those on a boundary that two bodies share are duplicated.
-
-    Returns the name to body. A surface belongs to every body on whose boundary some of its facets lie.
+    Every body has its own nodes: those on a boundary that two bodies share are duplicated. A surface belongs
+    to every body on whose boundary some of its facets lie.
     """
     points, cells = with_centres(mesh.points, mesh.cells, mesh.dim)
     follow = {kind for kind, rows in cells.items() if rows.shape != mesh.cells[kind].shape}
@@ -216,10 +201,7 @@ def _checked_order(mesh: TaggedMesh, name: str, cells: Mapping[str, np.ndarray])
 
 
 def one_array(cells: Mapping[str, np.ndarray], dim: int) -> np.ndarray:
-    """Return the nodes of complete cells, those of one shape as they are, of several as hexahedra.
-
-    `cells`: any name to node numbers, (n_cells, nodes of a cell), all of one order.
-    """
+    """Return the nodes of complete cells, those of one shape as they are, of several as hexahedra."""
     shapes = {kind: shape_of(rows.shape[1], dim) for kind, rows in cells.items()}
     first = next(iter(shapes.values()))
     if len(cells) == 1 and (first.is_whole or first.is_simplex):

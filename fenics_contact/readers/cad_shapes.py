@@ -29,11 +29,8 @@ def shape_of_entity(
 ) -> SurfaceShape | None:
     """Return the shape of a face, in the plane of a curve, of gmsh's current model.
 
-    `middles`: points on or close to it, (n, 3 | 2), [length]; `outwards`: directions out of the body there,
-    (n, 3 | 2).
-
-    Returns a plane, sphere, cylinder, cone or torus if it is one, else a spline through its points; None if
-    the model has only a mesh and no geometry.
+    It is a plane, sphere, cylinder, cone or torus if it is one, else a spline through its points; None if the
+    model has only a mesh and no geometry. `middles`: points on or close to it.
     """
     if gmsh.model.getType(*entity).startswith("Discrete"):
         return None
@@ -119,13 +116,10 @@ def cad_shapes(
 
     Planes, spheres, cylinders, cones and tori are recognised, also if the model represents them as splines;
     other faces become splines through their points. The shapes no longer need gmsh, and can be sent to other
-    ranks. A surface of several faces is `Joined`.
-
-    `surfaces`: name of a surface of the body to the physical groups (by name, or number), or named entities,
-    of which it consists. All surfaces with the name of such a group unless given.
-
-    Returns the name of the surface to its shape. Surfaces whose faces have no geometry, as in a mesh that was
-    read from a file, and those whose nodes have left it are omitted.
+    ranks. A surface of several faces is `Joined`. Surfaces whose faces have no geometry, as in a mesh that
+    was read from a file, and those whose nodes have left it are omitted. `surfaces`: name of a surface to the
+    physical groups (by name, or number), or named entities, of which it consists; all with the name of such a
+    group unless given.
     """
     gmsh = running_gmsh()
     if gmsh is None:

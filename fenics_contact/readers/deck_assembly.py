@@ -26,16 +26,9 @@ _NAMES = {
 
 @dataclass(frozen=True, eq=False)
 class _Instance:
-    """A part in its place.
+    """A part in its place: shifted, then turned about a point of the axis.
 
-    Attributes:
-        card: The card *INSTANCE.
-        name: Its name in capitals.
-        part: That of its part.
-        own: Cards between *INSTANCE and *END INSTANCE.
-        shift: How it is moved before it is turned, (3,), [length].
-        turn: Its rotation, (3, 3).
-        about: A point of the axis of the rotation, (3,).
+    `own`: cards between *INSTANCE and *END INSTANCE.
     """
 
     card: Card
@@ -153,10 +146,6 @@ def in_one_piece(cards: Sequence[Card]) -> list[Card]:
 
     Nodes, elements, sets, surfaces and sections of an instance are named ``INSTANCE.NAME`` there; cards of
     the assembly and behind it, which refer to such names or to ``INSTANCE.5``, keep their meaning.
-
-    Raises:
-        DeckError: If the structure is not complete, a part or instance is not there, or a card within a part
-            has no meaning there.
     """
     if not any(card.name in FRAMES for card in cards):
         return list(cards)

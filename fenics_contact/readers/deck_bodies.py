@@ -62,12 +62,7 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """Elements that share faces.
-
-    Attributes:
-        elements: Their positions, ascending.
-        sections: Numbers of their sections, in the order of the deck.
-    """
+    """Elements that share faces, ascending, and the sections they have."""
 
     name: str
     elements: np.ndarray
@@ -113,12 +108,7 @@ def _name(mesh: DeckMesh, elements: np.ndarray, of_sections: Sequence[str], take
 
 @dataclass(frozen=True, eq=False)
 class Exterior:
-    """The faces that belong to one element alone.
-
-    Attributes:
-        faces: The faces.
-        nodes: Positions of their nodes, −1 behind the last, (n, most nodes of a face).
-    """
+    """The faces that belong to one element alone, and their nodes, −1 behind the last."""
 
     mesh: DeckMesh
     faces: Faces
@@ -194,9 +184,7 @@ def _every_face(mesh: DeckMesh) -> tuple[Faces, np.ndarray, np.ndarray]:
 class Parts:
     """The meshes of a deck's bodies.
 
-    Attributes:
-        meshes: Name -> mesh, its regions named by their sections if there are several.
-        nodes: Name -> positions in the deck of the nodes of its mesh, −1 for nodes that the deck has not.
+    `nodes`: name -> positions in the deck of the nodes of its mesh, −1 for nodes that the deck has not.
     """
 
     meshes: Mapping[str, BodyMesh]
@@ -320,8 +308,6 @@ def split_sections(
     """Cut sections of bodies that sets of elements have a part of, so that each is in a set or is not.
 
     `sets`: names, which parts of sections get behind their own, and elements.
-
-    Returns the mesh with sets of the new sections, the sections, that of each element, and the bodies.
     """
     found, of_element, parts = list(sections), of_element.copy(), list(parts)
     new: dict[str, np.ndarray] = {}

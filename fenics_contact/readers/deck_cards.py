@@ -67,9 +67,8 @@ class Origin:
 class Instances:
     """Numbers of nodes and elements of a deck with instances of parts.
 
-    Attributes:
-        names: Of the instances, in the order of the deck, behind "" for what belongs to none.
-        stride: What is added to numbers of an instance, times its place among the names.
+    `names`: of the instances, in the order of the deck, behind "" for what belongs to none; `stride`: what is
+    added to numbers of an instance, times its place among the names.
     """
 
     names: Sequence[str]
@@ -94,13 +93,9 @@ NO_INSTANCES = Instances(("",), 2**63 - 1)
 class Card:
     """A keyword, its parameters and its data.
 
-    Attributes:
-        name: The keyword in capitals without blanks: "SOLIDSECTION".
-        parameters: Names in capitals without blanks -> values as written, "" for flags.
-        lines: Data lines without comments and blank lines.
-        numbers: Numbers of the data lines in their files.
-        instances: Those of the deck.
-        files: Names of the files of the data lines, where not all are of that of the keyword.
+    `parameters`: names in capitals without blanks -> values as written, "" for flags; `numbers`: numbers of
+    the data lines in their files; `files`: names of the files of the data lines, where not all are of that of
+    the keyword.
     """
 
     name: str
@@ -298,9 +293,7 @@ _FLAGS = {
 class _Stretch:
     """A keyword and the data lines behind it in its file, or, without one, data of the card before.
 
-    Attributes:
-        line: Number of the line of the keyword, 0 without one.
-        numbers: Numbers of the data lines.
+    `line`: number of the line of the keyword, 0 without one.
     """
 
     keyword: str

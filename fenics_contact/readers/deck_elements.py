@@ -25,12 +25,9 @@ from fenics_contact.readers.deck_cards import Card
 class Element:
     """One type of elements.
 
-    Attributes:
-        name: Its name, "C3D20R".
-        kind: "solid", "plane stress", "plane strain" or "axisymmetric".
-        cell: Name of the type of cells that has its nodes.
-        count: Number of its nodes.
-        variant: Letters behind the number: "R" for reduced integration, "I" for incompatible modes.
+    `kind`: "solid", "plane stress", "plane strain" or "axisymmetric"; `cell`: name of the type of cells that
+    has its nodes; `variant`: letters behind the number: "R" for reduced integration, "I" for incompatible
+    modes.
     """
 
     name: str
@@ -145,9 +142,8 @@ def element_of(card: Card) -> Element:
 class Collapsed(Element):
     """Hexahedra or quadrilaterals that list nodes twice, as the prisms, pyramids, ... that they are.
 
-    Attributes:
-        onto: Position of the node that stands in each place of the element as the deck lists it; the faces
-            are those of the hexahedron or quadrilateral, empty where they are no more than an edge or a node.
+    `onto`: position of the node that stands in each place of the element as the deck lists it; the faces are
+    those of the hexahedron or quadrilateral, empty where they are no more than an edge or a node.
     """
 
     onto: tuple[int, ...] = ()
@@ -187,8 +183,6 @@ def without_repeated(
 
     Linear hexahedra and quadrilaterals that list nodes twice, as of meshes swept around an axis, are prisms,
     pyramids, tetrahedra and triangles: their functions and integrals are the same.
-
-    `nodes`: positions of nodes, (n, nodes of an element); `numbers`: of the elements, (n,).
     """
     alike = nodes[:, :, None] == nodes[:, None, :]
     pattern, number = np.unique(alike.argmax(axis=2), axis=0, return_inverse=True)

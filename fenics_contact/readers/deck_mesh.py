@@ -15,10 +15,8 @@ from fenics_contact.readers.deck_elements import Element, element_of, without_re
 class Block:
     """Elements of one card.
 
-    Attributes:
-        nodes: Positions of their nodes in the deck, (n, nodes of an element).
-        first: Position of the first of them among all elements.
-        records: Which of the elements of the card they are, (n,).
+    `first`: position of the first of them among all elements; `records`: which of the elements of the card
+    they are.
     """
 
     element: Element
@@ -56,17 +54,10 @@ class Named:
 
 @dataclass(eq=False)
 class DeckMesh:
-    """What a deck says of its mesh.
+    """What a deck says of its mesh; nodes and elements are known by their positions in it.
 
-    Attributes:
-        numbers: Numbers of the nodes in the deck, ascending, (n,); nodes are known by their positions here.
-        points: Their coordinates, (n, 3), [length].
-        element_numbers: Numbers of the elements in the order of the blocks.
-        node_sets: Name -> ascending positions of nodes.
-        element_sets: Name -> ascending positions of elements.
-        surfaces: Name -> faces or nodes.
-        origins: Name of a set -> its first card.
-        couplings: Name of a set of elements DCOUP3D, which are no cells -> positions of their nodes.
+    `numbers`: numbers of the nodes in the deck, ascending; `origins`: name of a set -> its first card;
+    `couplings`: name of a set of elements DCOUP3D, which are no cells -> positions of their nodes.
     """
 
     numbers: np.ndarray
@@ -349,10 +340,7 @@ def joined(parts: Iterable[Faces]) -> Faces:
 class MeshCards:
     """The mesh of a deck with other sets, surfaces and sections.
 
-    Attributes:
-        elements: Name -> positions of elements.
-        sets: Name -> positions of nodes.
-        sections: The cards of its sections.
+    `elements` and `sets`: positions of elements and of nodes by name.
     """
 
     mesh: DeckMesh

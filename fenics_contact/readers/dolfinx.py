@@ -183,11 +183,8 @@ _QUADRATIC = {"tetrahedron_10", "hexahedron_27", "triangle_6", "quadrilateral_9"
 class Grid:
     """One grid.
 
-    Attributes:
-        topology: XDMF's name of its cells, in lower case.
-        has_points: Whether it has coordinates of its own.
-        has_values: Whether it has values on its cells.
-        inline: Whether its data are in the file itself and not in an HDF5 file beside it.
+    `topology`: XDMF's name of its cells, in lower case; `has_points`: whether it has coordinates of its own;
+    `inline`: whether its data are in the file itself and not in an HDF5 file beside it.
     """
 
     name: str

@@ -38,7 +38,7 @@ _TYPES = {
 def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
     """Return the cells of the highest dimension and the physical groups of gmsh's current model.
 
-    Returns nodes in the order of their tags, cells in the order of entities, labels by name.
+    Nodes are in the order of their tags, cells in that of entities.
     """
     elements = {dim: _elements(gmsh, dim, source) for dim in (3, 2)}
     dim = 3 if elements[3] else 2

@@ -88,11 +88,8 @@ _SERENDIPITY_OR_LAGRANGE = {
 class Block:
     """The role of a block of a meshio mesh.
 
-    Attributes:
-        kind: Type of cells, None for a block that holds no cells of the bodies.
-        start: Number of its first cell among those of its type.
-        facets: Corners of its facets, (n, 4 | 3 | 2), None for a block that holds none.
-        size: Number of its cells of any kind.
+    `kind`: type of cells, None for a block that holds no cells of the bodies; `start`: number of its first
+    cell among those of its type; `size`: number of its cells of any kind.
     """
 
     kind: str | None
@@ -104,11 +101,7 @@ class Block:
 def cells_of(
     mesh: meshio.Mesh, source: str, corners_only: bool
 ) -> tuple[np.ndarray, list[Block], dict[str, np.ndarray]]:
-    """Sort the blocks of a mesh into cells and facets.
-
-    Returns coordinates, (n_nodes, 3 | 2), the role of each block, and cell type to nodes, (n_cells, nodes of
-    a cell).
-    """
+    """Sort the blocks of a mesh into cells and facets, and return the role of each block."""
     dim = max((block.dim for block in mesh.cells if len(block)), default=0)
     if dim < 2:
         raise InvalidInputError(
@@ -192,10 +185,7 @@ def labels_of(
     source: str,
     everything: bool,
 ) -> tuple[Groups, Facets, dict[Label, np.ndarray]]:
-    """Return the labels of cells, facets and nodes.
-
-    Returns label to cell type to cells, label to corners of facets, label to nodes.
-    """
+    """Return by label cells (by type), corners of facets, and nodes."""
     sets = _sets(mesh, blocks, source)
     node_sets = {name: np.asarray(nodes, dtype=np.int64) for name, nodes in _node_sets(mesh).items()}
     of_sets = {name: members for name, members in sets.items() if _cells_among(members, blocks)}
