@@ -31,12 +31,7 @@ from fenics_contact.readers.deck_mesh import MeshCards
 
 @dataclass(frozen=True, eq=False)
 class DeckBodies:
-    """The bodies of a deck, and all that they are built from.
-
-    Attributes:
-        parts: Their meshes.
-        bodies: The bodies with materials.
-    """
+    """The bodies of a deck, and all that they are built from."""
 
     deck: DeckCards
     steps: DeckSteps

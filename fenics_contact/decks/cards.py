@@ -63,19 +63,9 @@ class Record:
 class DeckCards:
     """The cards of a deck, sorted.
 
-    Attributes:
-        record: Where notes and origins of parts go.
-        of_element: Number of the section of each element, (n_elements,).
-        components: The bodies by their elements.
-        exterior: The faces on their boundaries.
-        orientations: Cards of axes of materials by name.
-        stress: Initial stresses of elements.
-        strain: Plastic strains of elements.
-        driven: Surfaces that nodes drive or load.
-        means: Nodes that move as means of others.
-        axes: Local axes of nodes.
-        sides: Surfaces of contact pairs and ties.
-        changes: What each step changes of contact pairs, None where it changes nothing.
+    `of_element`: number of the section of each element; `driven`: surfaces that nodes drive or load; `means`:
+    nodes that move as means of others; `changes`: what each step changes of contact pairs, None where it
+    changes nothing.
     """
 
     name: str

@@ -23,8 +23,7 @@ Note: TypeAlias = Callable[[Card, str], None]
 class Interaction:
     """A surface interaction with the cards behind it.
 
-    Attributes:
-        behavior: How surfaces press; its own card, which means hard contact, if none is given.
+    `behavior`: how surfaces press; its own card, which means hard contact, if none is given.
     """
 
     behavior: Card
@@ -76,9 +75,7 @@ class Around:
 class Sides:
     """Two surfaces by name, and the card that names them.
 
-    Attributes:
-        tied: Whether they stay together.
-        around: The axis of a sector, of which they are both sides.
+    `tied`: whether they stay together; `around`: the axis of a sector, of which they are both sides.
     """
 
     slave: str

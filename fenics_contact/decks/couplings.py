@@ -18,12 +18,10 @@ from fenics_contact.readers.deck_mesh import NO_NODES, DeckMesh, Faces
 class Driven:
     """A surface that a node drives or loads.
 
-    Attributes:
-        surface: Name of the surface in the deck, or "" for nodes.
-        nodes: Its nodes, none for those of a surface or of elements.
-        node: Position of the node whose displacements, or whose forces, are those of its point.
-        turning: Position of the node whose displacements are its rotation, −1 if `node` has rotations.
-        spread: Whether the surface stays flexible, and only forces are given.
+    `surface`: name of the surface in the deck, or "" for nodes; `nodes`: its nodes, none for those of a
+    surface or of elements; `node`: position of the node whose displacements, or whose forces, are those of
+    its point; `turning`: position of the node whose displacements are its rotation, −1 if `node` has
+    rotations; `spread`: whether the surface stays flexible, and only forces are given.
     """
 
     card: Card
@@ -139,8 +137,7 @@ def rigid_surface(driven: Driven, body: str, surface: str, at: np.ndarray, insta
 class Bolt:
     """A pre-tension section: faces through a body, and the node that draws them together.
 
-    Attributes:
-        sense: −1 where its normal points into the elements of the faces: what the node has presses apart.
+    `sense`: −1 where its normal points into the elements of the faces: what the node has presses apart.
     """
 
     card: Card
@@ -189,9 +186,8 @@ def drawn(bolt: Bolt, held: Preload, instant: Instant, before: Instant) -> Itera
 class LocalAxes:
     """Axes of some nodes along which components are counted.
 
-    Attributes:
-        rows: Position of a node -> its axes as rows, (3, 3).
-        on_axis: Cards of cylinders, and nodes on the axis, where no direction is the radial one.
+    `rows`: position of a node -> its axes as rows; `on_axis`: cards of cylinders, and nodes on the axis,
+    where no direction is the radial one.
     """
 
     mesh: DeckMesh

@@ -33,11 +33,7 @@ _NOTHING: dict[str, Any] = {
 
 @dataclass(frozen=True, eq=False)
 class DeckFile(SceneFile):
-    """A deck with what scene files say of solver, accuracy and output.
-
-    Attributes:
-        deck: The deck.
-    """
+    """A deck with what scene files say of solver, accuracy and output."""
 
     deck: Deck
 

@@ -19,9 +19,8 @@ _IN_VOIGT = [0, 1, 2, 5, 4, 3]
 class TensorGiven:
     """Initial stresses, or plastic strains, of elements.
 
-    Attributes:
-        card: The last card that gives some, that of the first elements if none does.
-        values: By element, xx, yy, zz, yz, xz, xy, (n_elements, 6), zero where none is given.
+    `card`: the last card that gives some, that of the first elements if none does; `values`: by element, xx,
+    yy, zz, yz, xz, xy, (n_elements, 6), zero where none is given.
     """
 
     card: Card

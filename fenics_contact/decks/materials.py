@@ -103,15 +103,10 @@ def depends_on_temperature(card: Card, width: int) -> bool:
 class Conditions:
     """What materials are built for.
 
-    Attributes:
-        kind: That of the elements, see `Element.kind`.
-        large: Whether a step has NLGEOM.
-        temperature: The one temperature of all steps, None where it varies.
-        heated: Whether temperatures change.
-        initial: The initial temperature of all nodes, None where it varies.
-        thickness: That of a plane body where the deck has several, else None.
-        dilatation: Whether cells are linear hexahedra or quadrilaterals, whose changes of volume are means.
-        expands: Whether the body is heated and some material of it expands: others then do so by zero.
+    `temperature`: the one temperature of all steps, None where it varies; `thickness`: that of a plane body
+    where the deck has several, else None; `dilatation`: whether cells are linear hexahedra or quadrilaterals,
+    whose changes of volume are means; `expands`: whether the body is heated and some material of it expands:
+    others then do so by zero.
     """
 
     kind: str

@@ -14,13 +14,7 @@ from fenics_contact.readers.deck_mesh import DeckMesh
 
 @dataclass(frozen=True, eq=False)
 class Equation:
-    """A linear equation between components of nodes, Σ c u = 0.
-
-    Attributes:
-        nodes: Positions of the nodes of its terms.
-        components: Their components, from zero.
-        factors: Their factors.
-    """
+    """A linear equation between components, from zero, of nodes: Σ c u = 0."""
 
     card: Card
     row: int
@@ -66,8 +60,7 @@ def read_equations(cards: Sequence[Card], mesh: DeckMesh) -> list[Equation]:
 class Mean:
     """A node that moves as the weighted mean of others, and whose forces these share.
 
-    Attributes:
-        weights: Of the others, with the sum one.
+    `weights`: of the others, with the sum one.
     """
 
     card: Card

@@ -28,10 +28,8 @@ Forced: TypeAlias = Sequence[tuple[str, tuple[float, ...]]]
 class ContactNames:
     """Surfaces of contact pairs and ties.
 
-    Attributes:
-        sides: The pairs and ties, as far as these reach.
-        surfaces: Name of a surface in the deck -> that in the meshes.
-        alone: Name of a slave whose nodes touch one by one -> that of the node set in the meshes.
+    `sides`: the pairs and ties, as far as these reach; `alone`: name of a slave whose nodes touch one by one
+    -> that of the node set in the meshes.
     """
 
     sides: Sequence[Sides]
@@ -43,11 +41,8 @@ class ContactNames:
 class Names:
     """What surfaces and sets of nodes are called.
 
-    Attributes:
-        supported: Name -> what is held there in any step.
-        driven: What nodes drive or load, with the name of the surface, or of the set of nodes.
-        pressed: Where pressures act -> the name of the surface.
-        forced: For each instant of the steps where forces act on nodes.
+    `supported`: name -> what is held there in any step; `pressed`: where pressures act -> the name of the
+    surface; `forced`: for each instant of the steps where forces act on nodes.
     """
 
     surfaces: Mapping[str, Faces]

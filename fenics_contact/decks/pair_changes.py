@@ -17,10 +17,7 @@ _CHANGES = {"CHANGEFRICTION": "FRICTION", "CHANGESURFACEBEHAVIOR": "SURFACEBEHAV
 class PairChange:
     """What contact is from a step on.
 
-    Attributes:
-        interactions: Surface interactions by name.
-        known: Slave and master of all pairs.
-        removed: Those of the pairs that do not act.
+    `known`: slave and master of all pairs; `removed`: those of the pairs that do not act.
     """
 
     interactions: Mapping[str, Interaction]

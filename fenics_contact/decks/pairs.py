@@ -21,8 +21,7 @@ from fenics_contact.readers.deck_cards import Card
 class Pairs:
     """Contact pairs and ties, each with the surfaces of the deck that it is of.
 
-    Attributes:
-        contacts: The contact pairs; those that some step leaves out are the last ones.
+    `contacts`: the contact pairs; those that some step leaves out are the last ones.
     """
 
     contacts: Sequence[tuple[Sides, ContactPair]]

@@ -24,7 +24,7 @@ def spread_out(points: np.ndarray, near: float = 1e-9) -> np.ndarray:
 
 
 def in_their_space(points: np.ndarray, others: np.ndarray, near: float = 1e-9) -> np.ndarray | None:
-    """Return the weights with the sum one by which points are means of others, (n, m), if all are, or None.
+    """Return the weights with the sum one by which points are means of others, if all are, or None.
 
     These keep their meaning in every rotation, however large.
     """
@@ -62,7 +62,7 @@ def following(
 ) -> LinearConstraint:
     """Return that nodes of a body move with others: u = Σ A u_leader.
 
-    `leaders`: nodes of body `first`, (m,); `moved`: A, (n, components, m, dim).
+    `leaders`: nodes of body `first`; `moved`: A, (n, components, m, dim).
     """
     count, parts, width, dim = moved.shape
     axes = np.tile(np.eye(dim)[-parts:], (count, 1))

@@ -20,8 +20,7 @@ from fenics_contact.readers.deck_mesh import DeckMesh
 class Amplitude:
     """A factor over time: linear between values, constant beyond them.
 
-    Attributes:
-        total: Whether time counts from the first step on, else from the start of each.
+    `total`: whether time counts from the first step on, else from the start of each.
     """
 
     times: np.ndarray
@@ -94,12 +93,9 @@ def read_amplitudes(cards: Sequence[Card]) -> dict[str, Amplitude]:
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """A time of a step.
+    """A time of a step, from the first step on, and the factors of amplitudes by their numbers.
 
-    Attributes:
-        time: From the first step on.
-        share: Share of its change that what is ramped has made.
-        factors: Those of amplitudes by their numbers.
+    `share`: share of its change that what is ramped has made.
     """
 
     time: float
@@ -129,12 +125,8 @@ class Ramp:
 class Acting:
     """A pressure on faces, or a load on volumes: acceleration, or the square of an angular velocity.
 
-    Attributes:
-        where: Element set or element, and face or "GRAV" or "CENTRIF": ("TOP", "P2"); of a surface its name.
-        value: At the time, or the aim of the step; of pressures [force / length²].
-        numbers: Direction or axis of a load on volumes.
-        by: Number of its amplitude.
-        start: Its value at the start of the step.
+    `where`: element set or element, and face or "GRAV" or "CENTRIF": ("TOP", "P2"); of a surface its name;
+    `value`: at the time, or the aim of the step, and `start`, at its start; `by`: number of its amplitude.
     """
 
     card: Card
@@ -159,11 +151,8 @@ class Acting:
 class Held:
     """Nodes that a card holds.
 
-    Attributes:
-        label: Name of the set, or number of the node; "" for single nodes.
-        components: Components from zero.
-        value: Displacement or rotation, or that of each.
-        by: Number of its amplitude.
+    `label`: name of the set, or number of the node; "" for single nodes; `value`: displacement or rotation,
+    or that of each; `by`: number of its amplitude.
     """
 
     label: str
@@ -184,14 +173,8 @@ class Held:
 class Instant:
     """What acts at a time of a step.
 
-    Attributes:
-        time: Time from the first step on.
-        held: What nodes are held at, NaN where they are free, displacements and rotations, (n_nodes, 6),
-            along their local axes.
-        forces: Forces and moments on nodes, (n_nodes, 6), along their local axes.
-        temperatures: (n_nodes,).
-        fixed: What is held as it was before the step, (n_nodes, 6).
-        kept: What of it was free before, so that `held` does not know its value, (n_nodes, 6).
+    `held`: what nodes are held at, NaN where they are free, displacements and rotations, (n_nodes, 6), along
+    their local axes; `kept`: what of it was free before, so that `held` does not know its value.
     """
 
     time: float
@@ -223,13 +206,9 @@ class Instant:
 class StepState:
     """What holds, loads and heats in a step.
 
-    Attributes:
-        held: Displacements and rotations of nodes, NaN where they are free, (n_nodes, 6).
-        forces: Forces and moments on nodes, (n_nodes, 6).
-        temperatures: (n_nodes,).
-        acting: Loads on faces and volumes, each once for where it is.
-        fixed: What is held as it was before the step, (n_nodes, 6).
-        kept: What of it was free before, (n_nodes, 6).
+    `held`: displacements and rotations of nodes, NaN where they are free, (n_nodes, 6); `acting`: loads on
+    faces and volumes, each once for where it is; `fixed`: what is held as it was before the step; `kept`:
+    what of it was free before.
     """
 
     held: Ramp
@@ -328,9 +307,8 @@ def _added(known: Sequence[Acting], given: Sequence[Acting], reached: Sequence[A
 class Step:
     """One load step of a deck.
 
-    Attributes:
-        large: Whether it has NLGEOM, or one before it.
-        instants: What acts at times of it, the last one at its end.
+    `large`: whether it has NLGEOM, or one before it; `instants`: what acts at times of it, the last one at
+    its end.
     """
 
     card: Card
@@ -343,12 +321,8 @@ class Step:
 class DeckSteps:
     """The load steps of a deck.
 
-    Attributes:
-        targets: What is held, in the order of the deck, before and in all steps.
-        prints: Cards that ask for results, with the number of their step.
-        initial: Temperatures of nodes before all steps, (n_nodes,).
-        at_rest: What is held in the first step, or without any, all at zero.
-        equations: Equations between components of nodes.
+    `targets`: what is held, in the order of the deck, before and in all steps; `at_rest`: what is held in the
+    first step, or without any, all at zero.
     """
 
     steps: Sequence[Step]
@@ -471,10 +445,7 @@ def _check_step(head: Card, group: Sequence[Card]) -> None:
 class Loads:
     """What the cards of a step load and heat, in their order, with the numbers of amplitudes.
 
-    Attributes:
-        replaced: Keywords whose first card replaces all that is there from earlier steps.
-        forces: Nodes, components and values, each (n,).
-        temperatures: Nodes and values.
+    `replaced`: keywords whose first card replaces all that is there from earlier steps.
     """
 
     replaced: set[str]

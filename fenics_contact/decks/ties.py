@@ -16,12 +16,8 @@ from fenics_contact.shapes.triangles import TriangleTree
 class Reach:
     """How far the nodes of a slave are from its master, and how far a tie reaches.
 
-    Attributes:
-        faces: The faces of the slave.
-        tied: Which of them have no node that is too far away, (n_faces,).
-        apart: Nodes that are too far away.
-        farthest: Largest distance of nodes of tied faces, [length].
-        tolerance: Distance up to which nodes are tied, [length].
+    `tied`: which of them have no node that is too far away; `apart`: nodes that are too far away; `farthest`:
+    largest distance of nodes of tied faces; `tolerance`: distance up to which nodes are tied.
     """
 
     faces: Faces
@@ -58,10 +54,8 @@ def reach_of(card: Card, mesh: DeckMesh, slave: Faces, master: Faces, share: flo
     """Return which faces of a slave a tie reaches.
 
     Distances are those along the normals of the master's faces, so that nodes beyond its edge count by their
-    distance from its continuation.
-
-    `share`: tolerance, unless the card gives one, over the mean edge of the master's faces: that of the
-    manual of CalculiX.
+    distance from its continuation. `share`: tolerance, unless the card gives one, over the mean edge of the
+    master's faces: that of the manual of CalculiX.
     """
     edges = [
         np.linalg.norm(mesh.points[np.roll(corners, -1, axis=1)] - mesh.points[corners], axis=2).ravel()

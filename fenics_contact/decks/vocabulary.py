@@ -135,11 +135,7 @@ STRUCTURES = {
 
 
 def refuse_unknown(cards: Sequence[Card]) -> None:
-    """Refuse cards, types of elements and parameters that are not known, at the first one.
-
-    Raises:
-        DeckError: With the others behind it, each with its line.
-    """
+    """Refuse unknown cards, types of elements and parameters, all in one error, each with its line."""
     found = list(_unknown(cards))
     if not found:
         return
