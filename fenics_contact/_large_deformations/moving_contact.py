@@ -252,7 +252,7 @@ class TurningRows(RowGroup):
     """Rows of turning forces on the free components of nodes.
 
     `fields`: displacements of nodes that the rows measure; dof dim · node + component of all nodes; `axes`:
-    axes of nodes along which supports prescribe components; None: the coordinates' everywhere.
+    axes of nodes along which supports prescribe components.
     """
 
     fields: sp.csr_matrix

@@ -460,9 +460,10 @@ def _measured(
         if isinstance(pair, CyclicSymmetry):
             from fenics_contact._pairing.sectors import check_sides
 
-            master = master.turned(pair, pair.angle_in(scene))
+            angle = pair.angle_in(scene)
+            master = master.turned(pair, angle)
             with together(comm):
-                check_sides(pair, pair.angle_in(scene), slave.surface, master.surface)
+                check_sides(pair, angle, slave.surface, master.surface)
         assert isinstance(pair.master, Surface)
         advice.surface(scene, pair.master, pair.geometry, master.surface, comm)
         if isinstance(pair, Tie) and not pair.sliding and not axes:
@@ -479,7 +480,7 @@ def _measured(
                 held = ~movable | np.isin(slave.nodes, points.slave)
                 advice.edge_of_tie(pair, slave.surface, held, master.surface, comm)
         if isinstance(pair, CyclicSymmetry):
-            turn = np.tile(pair.matrix(pair.angle_in(scene)), (points.count, 1, 1))
+            turn = np.tile(pair.matrix(angle), (points.count, 1, 1))
             points = replace(points, turns=turn)
         else:
             points = with_symmetry(points, _symmetric(points, slave, master), slave.surface.planes)

@@ -41,8 +41,8 @@ class ConstraintRows(Joint):
     `equations`: A, all equations of all constraints; `kept`: S T, shape (n_rows, n_equations), of the
     independent rows; `lost`: T on equations that supports determine or that depend on others, shape (n_lost,
     n_equations); `dependence`: what of each lost one the rows make, shape (n_lost, n_rows); `free`: S T A P,
-    shape (n_rows, n_nodes · components); `axes`: axes of nodes along which supports prescribe components;
-    None: the coordinates' everywhere.
+    shape (n_rows, n_nodes · components); `axes`: axes of nodes along which supports prescribe
+    components.
     """
 
     constraints: Sequence[LinearConstraint]
@@ -84,7 +84,7 @@ class ConstraintRows(Joint):
         """Return those of a scene; `fixed`: see `Relations.rows`."""
         equations, first = _equations(scene, tearing)
         size = _lengths(equations)
-        free = equations @ _onto_free(fixed, axes)
+        free = equations @ free_matrix(fixed, axes)
         free = _cleaned(free, size)
         loose = _lengths(free) > HELD * size
         whole = _picked(loose)
@@ -115,7 +115,7 @@ class ConstraintRows(Joint):
     @property
     def projection(self) -> sp.csr_matrix:
         """P onto free components, shape (n_nodes · components, n_nodes · components)."""
-        return _onto_free(self.fixed, self.axes)
+        return free_matrix(self.fixed, self.axes)
 
     @property
     def left_out(self) -> int:
@@ -219,11 +219,6 @@ class ConstraintRows(Joint):
         """Return the work of unit multipliers, shape (n_modes, n_rows)."""
         own = slice(nodes.start * self.components, nodes.stop * self.components)
         return np.asarray(self.whole[:, own] @ modes.reshape(-1, modes.shape[2])).T
-
-
-def _onto_free(fixed: np.ndarray, axes: LocalAxes) -> sp.csr_matrix:
-    """Return the projection onto free components, see `ConstraintRows`."""
-    return free_matrix(fixed, axes)
 
 
 def _equations(scene: Scene, tearing: Tearing) -> tuple[sp.csr_matrix, np.ndarray]:

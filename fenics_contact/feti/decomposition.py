@@ -203,7 +203,7 @@ def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalA
     """Collect the supports node by node, with the axes of nodes that rollers hold.
 
     Returns the value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length], and
-    along which axes; None: all along the coordinates'.
+    along which axes.
     """
     prescribed = np.full((tearing.n_nodes, scene.components), np.nan)
     for support in scene.supports:

@@ -60,8 +60,7 @@ class SlidingContact:
         comm: Communicator of the ranks; all have all points.
         reach: Distance beyond which nodes have no point, [length].
         meetings: What of each pair stays the same.
-        axes: Axes of nodes that supports hold along other directions than the coordinates'; None: there are
-            none.
+        axes: Axes of nodes that supports hold along other directions than the coordinates'.
 
     Example:
         >>> from fenics_contact.gallery import block

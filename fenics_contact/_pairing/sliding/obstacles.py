@@ -96,7 +96,13 @@ class OnMovingObstacle(OnObstacle):
         placement: Placement = self.obstacle.frame(time)
         return placement
 
+    @property
+    def at_rest(self) -> SurfaceShape:
+        """The obstacle in its own coordinates."""
+        resting: SurfaceShape = self.obstacle.obstacle
+        return resting
+
     def shape(self, scene: Scene, coordinates: np.ndarray, time: float) -> SurfaceShape:
-        """Return the obstacle where it is at a time."""
+        """Return the obstacle where it is now."""
         turn, shift = self.placement(scene, coordinates, time)
-        return placed(self.obstacle.obstacle, turn, floats(shift))
+        return placed(self.at_rest, turn, floats(shift))

@@ -7,22 +7,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact._base.checks import floats
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._pairing.sliding.meeting import Found, Moved, Placement
-from fenics_contact._pairing.sliding.obstacles import OnObstacle
+from fenics_contact._pairing.sliding.obstacles import OnMovingObstacle
 from fenics_contact._pairing.sliding.stiffness import Differential
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.tools import ToolBody
-from fenics_contact.shapes.combined import placed
 from fenics_contact.shapes.simple import SurfaceShape
 
 
 @dataclass(frozen=True)
-class OnTool(OnObstacle):
+class OnTool(OnMovingObstacle):
     """Nodes that meet a tool, whose motion nodes of a body carry."""
 
     @classmethod
@@ -35,10 +33,11 @@ class OnTool(OnObstacle):
         body, nodes = self._carriers(scene)
         return body.frame(coordinates[nodes])
 
-    def shape(self, scene: Scene, coordinates: np.ndarray, time: float) -> SurfaceShape:
-        """Return the tool where its nodes have it."""
-        turn, shift = self.placement(scene, coordinates, time)
-        return placed(self.obstacle, turn, floats(shift))
+    @property
+    def at_rest(self) -> SurfaceShape:
+        """The tool in its own coordinates."""
+        tool: SurfaceShape = self.obstacle
+        return tool
 
     def _carriers(self, scene: Scene) -> tuple[ToolBody, np.ndarray]:
         """Return the body that carries the tool, and the numbers of its nodes."""
