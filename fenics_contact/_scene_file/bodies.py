@@ -246,8 +246,7 @@ AnyMaterial: TypeAlias = Annotated[
 class Shaped:
     """A mesh with its shape.
 
-    Attributes:
-        crown: The smooth surface that a design may move, of chain links.
+    `crown`: the smooth surface that a design may move, of chain links.
     """
 
     mesh: BodyMesh

@@ -223,10 +223,7 @@ class DesignPart(Part):
 
 
 def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
-    """Return a surface with its smooth coordinates.
-
-    `shape`: the body's mesh with its shape.
-    """
+    """Return a surface with its smooth coordinates."""
     if shape.crown is not None and surface == "contact":
         return shape.crown
     try:

@@ -306,9 +306,7 @@ def load_steps(
 class _LoadHistory:
     """All loads, or all supports, within a step, as a function of time.
 
-    Attributes:
-        ways: Their values before the step and at its end, or as formulas in t.
-        begin: Time at the begin of the step.
+    `ways`: their values before the step and at its end, or as formulas in t.
     """
 
     parts: tuple[Any, ...]

@@ -57,9 +57,7 @@ if TYPE_CHECKING:
 class ObstaclePath:
     """Where an obstacle is at a time.
 
-    Attributes:
-        motion: Displacement, then rotation, in the plane three components, in space six.
-        about: The point about which it turns, [length].
+    `motion`: displacement, then rotation, in the plane three components, in space six.
     """
 
     motion: tuple[float | Expression, ...]
@@ -495,11 +493,7 @@ class RollerPart(_Named):
 
     @classmethod
     def written(cls, made: Any) -> dict[str, Any]:
-        """Return the table of the roller.
-
-        Raises:
-            InvalidInputError: If its directions differ from node to node.
-        """
+        """Return the table of the roller, whose directions must be the same at all nodes."""
         if callable(made.direction):
             raise InvalidInputError(
                 f"a scene file has no directions that differ from node to node, as {made.in_words} has: run "

@@ -303,10 +303,7 @@ def shape_task(
     shapes: Mapping[str, Shaped],
     steps: Sequence[LoadStep],
 ) -> ShapeTask:
-    """Pose the optimisation of a scene file. Collective.
-
-    `shapes`: body name -> its mesh with its shape.
-    """
+    """Pose the optimisation of a scene file. Collective."""
     design = document.design
     assert design is not None
     moving = tuple(

@@ -301,10 +301,8 @@ BYTE_ORDER_MARK = "\ufeff"
 class Source:
     """The source of a scene.
 
-    Attributes:
-        folder: Folder to which its file names are relative.
-        text: The file's text, "" for a scene that came as a dictionary.
-        overrides: Overridden keys -> how they were given.
+    `folder`: folder to which its file names are relative; `text`: the file's text, "" for a scene that came
+    as a dictionary; `overrides`: overridden keys -> how they were given.
     """
 
     name: str

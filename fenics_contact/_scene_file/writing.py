@@ -26,11 +26,7 @@ WriteField = Callable[[NodeValues, str], dict[str, Any]]
 
 
 def table_for(made: object) -> type[Part]:
-    """Return the table that builds an object.
-
-    Raises:
-        InvalidInputError: If a scene file has none.
-    """
+    """Return the table that builds an object, or raise `InvalidInputError` if scene files have none."""
     found = [table for table in TABLES if table.describes(made)]
     if not found:
         raise InvalidInputError(
