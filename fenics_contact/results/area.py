@@ -114,14 +114,10 @@ def contact_width(state: State, direction: GivenVector, pair: int | str = 0) -> 
 class _SlaveSurface:
     """A slave surface, with what locates the rim of the contact on it.
 
-    Attributes:
-        places: Its nodes, deformed if its body deforms much, shape (n, dim), [length].
-        facets: Its facets by the numbers of their corners, shape (n_facets, corners).
-        pressure: Of closed nodes, zero at open ones, shape (n,).
-        spread: E* times the gap of open nodes, shape (n,).
-        facing: Share of each node's area that faces the master, zero at nodes without a contact point, (n,).
-        given: Marks of nodes whose area is among those of their neighbours, shape (n,).
-        beyond: How far contact reaches on the way to nodes without a contact point, relative to the distance.
+    `places`: its nodes, deformed if its body deforms much; `pressure`: of closed nodes, zero at open ones;
+    `spread`: E* times the gap of open nodes; `facing`: share of each node's area that faces the master, zero
+    at nodes without a contact point; `given`: marks of nodes whose area is among those of their neighbours;
+    `beyond`: how far contact reaches on the way to nodes without a contact point, relative to the distance.
     """
 
     places: np.ndarray
@@ -174,7 +170,7 @@ class _SlaveSurface:
 def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np.ndarray) -> _SlaveSurface:
     """Return the slave surface of a pair. Collective.
 
-    `inside`: pressure of all contact points that touch, zero at others, shape (n,); `apart`: their gaps.
+    `inside`: pressure of all contact points that touch, zero at others; `apart`: their gaps.
     """
     scene, contact = state.scene, state.contact
     pair = pair_number(scene.contacts, which)
@@ -259,10 +255,8 @@ def _reach(
     """Return how far contact reaches from a closed towards an open node, relative to their distance.
 
     p = K √d and E* g = 4/3 K (L − d)^(3/2); with y = K^(−2/3): p² y³ + (3/4 E* g)^(2/3) y = L.
-
-    `pressure`: p of the closed node, shape (n,), [force / length²]; `spread`: E* g of the open node, shape
-    (n,), [force / length]; `length`: distance L of the nodes, shape (n,), [length]; `newton_steps`: Newton
-    steps to the root of a cubic, from above: sufficient in practice for any ratio of its coefficients.
+    `newton_steps`: Newton steps to the root of a cubic, from above: sufficient in practice for any ratio of
+    its coefficients.
     """
     if np.isnan(spread).any():
         return np.full(len(length), 0.5)

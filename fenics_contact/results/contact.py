@@ -29,13 +29,10 @@ class Status(IntEnum):
 class RowValues:
     """What the law of each row of B depends on at a state, owned by rows.
 
-    Attributes:
-        multiplier: λ, shape (n_owned,), [force].
-        residual: c − B u, shape (n_owned,), [length]: gaps, minus the slip, and openings of glued rows.
-        slip_bound: Ψ, shape (n_friction,), [force].
-        step: ρ of the natural map, zero on equality rows, shape (n_owned,), [force / length].
-        opening: By how much the loads alone, or the next increment, open the rows, (n_owned,), [length].
-        between_supports: Marks of the rows that supports alone determine, shape (n_owned,).
+    `multiplier`: λ; `residual`: c − B u: gaps, minus the slip, and openings of glued rows; `slip_bound`: Ψ;
+    `step`: ρ of the natural map, zero on equality rows, shape (n_owned,), [force / length]; `opening`: by how
+    much the loads alone, or the next increment, open the rows; `between_supports`: marks of the rows that
+    supports alone determine.
     """
 
     multiplier: np.ndarray
@@ -51,10 +48,8 @@ class RowValues:
 class NormalForces:
     """The normal forces of a contact pair, added up in both ways.
 
-    Attributes:
-        sum: Σ λ_N, the pressure over the area, ≥ 0, [force].
-        resultant: ‖Σ n λ_N‖, of which nothing is left where they balance each other, as around a shaft; of
-            bodies of revolution along the axis, [force].
+    `sum`: Σ λ_N, the pressure over the area, ≥ 0; `resultant`: ‖Σ n λ_N‖, of which nothing is left where they
+    balance each other, as around a shaft; of bodies of revolution along the axis.
     """
 
     sum: float

@@ -163,7 +163,7 @@ class DeformedState(State):
 
     @cached_property
     def _moment_arms(self) -> np.ndarray:
-        """Where forces act on the nodes of all bodies, on every rank, shape (n_nodes, dim), [length].
+        """Where forces act on the nodes of all bodies, replicated, [length].
 
         Stress keeps a body of small strain in balance about its undeformed places, whatever others do.
         """

@@ -60,7 +60,7 @@ def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolf
     """Return the displacement as a Function on a body's mesh. Collective.
 
     `values`: displacement of the nodes of its cells, see `BodyMesh.at_nodes_apart`, valid at least on those
-    of this rank, shape (n_nodes, dim).
+    of this rank.
     """
     function = _dolfinx.coefficient(mesh, "displacement", values.shape[1])
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
@@ -72,8 +72,7 @@ def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolf
 def nodal_function(mesh: _dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> _dolfinx.fem.Function:
     """Return a scalar field on a body's mesh from its nodal values. Collective.
 
-    `values`: values at the nodes of its cells, see `BodyMesh.at_nodes_apart`, on every rank, shape (at least
-    n_nodes,).
+    `values`: values at the nodes of its cells, see `BodyMesh.at_nodes_apart`, replicated.
     """
     function = _dolfinx.fem.Function(_dolfinx.scalar_space(mesh, 1), name=name)
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
@@ -85,7 +84,7 @@ def nodal_function(mesh: _dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> _
 def cells_of_body(mesh: _dolfinx.mesh.Mesh, cells: np.ndarray) -> np.ndarray:
     """Return the number in the body of each cell owned by this rank, shape (n_owned,).
 
-    `cells`: node numbers of all cells of the body, see `BodyMesh.apart`, shape (n_cells, nodes of a cell).
+    `cells`: node numbers of all cells of the body, see `BodyMesh.apart`.
     """
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
     mine = _dolfinx.cell_nodes(mesh).reshape(-1, cells.shape[1])[:owned]
@@ -98,10 +97,7 @@ def cells_of_body(mesh: _dolfinx.mesh.Mesh, cells: np.ndarray) -> np.ndarray:
 
 
 def cell_values(function: _dolfinx.fem.Function, cells: np.ndarray) -> np.ndarray:
-    """Gather a cellwise constant Function in the order of a body's cells. Collective on its mesh.
-
-    Returns one value for every cell, (n_cells, ...), replicated.
-    """
+    """Gather a cellwise constant Function in the order of a body's cells, replicated. Collective."""
     space, shape = function.function_space, function.ufl_shape
     number = cells_of_body(space.mesh, cells)
     values = np.zeros((len(cells), *shape))
@@ -199,10 +195,7 @@ def stress(
 
 
 def principal_stress(stress: _dolfinx.fem.Function, cells: np.ndarray) -> _dolfinx.fem.Function:
-    """Return the principal stresses σ₁ ≥ σ₂ ≥ σ₃ of a cellwise stress, a Function of shape (3,). Collective.
-
-    `cells`: node numbers of all cells of the body, shape (n_cells, nodes of a cell).
-    """
+    """Return the principal stresses σ₁ ≥ σ₂ ≥ σ₃ of a cellwise stress, by cell. Collective."""
     mesh = stress.function_space.mesh
     own = _dolfinx.cell_dofs(stress.function_space).ravel()[: len(cells_of_body(mesh, cells))]
     return _dolfinx.cell_field(mesh, "principal_stress", principal(stress.x.array.reshape(-1, 3, 3)[own]))
@@ -297,13 +290,12 @@ def contact_fields(
 ) -> dict[str, np.ndarray]:
     """Return the contact result of a body's surfaces as fields on all its nodes.
 
-    Returns ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are not contact
-    points; and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
-    slave and ``contact_slip``, (n_nodes, 3), [force] and [length]; where a body of the scene deforms much
-    ``contact_nominal_pressure``, too. By nodes pressures and slip at the corners of quadratic triangles are
-    interpolated, see `filled_at_corners`, and pressures at the ends of quadratic edges on an axis of
-    revolution. A node that belongs to several pairs has their sum, and the status of the last; one whose
-    force is that of a point elsewhere, as on one of both sides of a sector, has the pressure there.
+    ``contact_status`` is the value of `Status`, −1 on nodes that are not contact points. Zero on those are
+    ``contact_pressure``, ``contact_force`` on the slave and ``contact_slip``; where a body of the scene
+    deforms much ``contact_nominal_pressure``, too. By nodes pressures and slip at the corners of quadratic
+    triangles are interpolated, see `filled_at_corners`, and pressures at the ends of quadratic edges on an
+    axis of revolution. A node that belongs to several pairs has their sum, and the status of the last; one
+    whose force is that of a point elsewhere, as on one of both sides of a sector, has the pressure there.
     """
     start, end = numbers.node_offset[numbers.body_names.index(body) :][:2]
     count = int(end - start)
@@ -358,11 +350,8 @@ def stress_fields(tensor: np.ndarray, prefix: str = "") -> dict[str, np.ndarray]
 def most_stressed(by_material: np.ndarray) -> np.ndarray:
     """Return the stress of each node in the material with the largest von Mises stress there.
 
-    A mean over materials would be the stress of none of them.
-
-    `by_material`: shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of a material.
-
-    The result has shape (n_nodes, 3, 3).
+    A mean over materials would be the stress of none of them. `by_material`: shape (n_materials, n_nodes, 3,
+    3), NaN where a node has no cell of a material.
     """
     size = von_mises_of(by_material)
     chosen = np.where(np.isnan(size), -1.0, size).argmax(axis=0)
@@ -419,13 +408,11 @@ def nodal_stress(
     meshes: Mapping[str, _dolfinx.mesh.Mesh],
     stresses: Mapping[str, _dolfinx.fem.Function],
 ) -> dict[str, np.ndarray]:
-    """Return the stress of all bodies at their nodes, material by material. Collective.
+    """Return the stress of all bodies at their nodes, material by material, replicated. Collective.
 
-    `displacement`: displacement of all nodes, valid on those of this rank, shape (n_nodes, dim), [length];
-    `stresses`: mean stress of the cells of at least the bodies with nonlinear materials, by name.
-
-    One value for each body, shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of the material,
-    replicated, [force / length²].
+    `displacement`: of all nodes, valid on those of this rank; `stresses`: mean stress of the cells of at
+    least the bodies with nonlinear materials, by name. The result of each body has shape (n_materials,
+    n_nodes, 3, 3), NaN where a node has no cell of the material.
     """
     # Recovery is part of estimates, which a state with a fixed tolerance need not import.
     from fenics_contact._accuracy.recovery import find_sites, recovered_gradients
@@ -462,9 +449,8 @@ def _at_sites(
     """Return the components of the stress at the sites of a body, shape (n_sites, 6). Collective.
 
     It is affine in the gradient. Its coefficients are the stresses of unit gradients, averaged over the cells
-    around a site; they are the same in all of them unless the material or the temperature varies.
-
-    `moved`: displacements of all nodes and gradients at the sites.
+    around a site; they are the same in all of them unless the material or the temperature varies. `moved`:
+    displacements of all nodes and gradients at the sites.
     """
     body, dim, width = torn.scene.bodies[name], torn.scene.dim, torn.components
     displacement, gradients = moved
@@ -509,8 +495,7 @@ def _around_sites(
 ) -> np.ndarray:
     """Return the means of values on cells over the cells around each site, shape (n_sites, k). Collective.
 
-    `values`: on this rank's cells of the body, shape (n_owned, k); `number`: number in the body of each of
-    them, shape (n_owned,).
+    `values`: on this rank's cells of the body; `number`: number in the body of each of them.
     """
     of_body = np.zeros((torn.scene.bodies[name].mesh.n_cells, values.shape[1] + 1))
     of_body[number] = np.pad(values, ((0, 0), (0, 1)), constant_values=1.0)

@@ -33,20 +33,13 @@ class NodalForces:
 
     The multipliers act on the torn bodies as f − Bᵀλ = K u. Summed over the copies of a node, gluing cancels,
     and −Bᵀλ is the reaction, where a component is prescribed, less what contacts and ties exert there (their
-    rows of B leave prescribed components out).
-
-    Attributes:
-        places: Where the nodes of all bodies are for moments: undeformed, on bodies that deform much
-            deformed, shape (n_nodes, dim), [length].
-        load: f, shape (n_nodes, dim); thermal strain included, which has no resultant.
-        reaction: Of supports, zero on free components, shape (n_nodes, dim).
-        contact: On the slave at each contact point, shape (n_contact, dim).
-        joints: Of each joint, see `Joint.forces`.
-        bed: What materials exert that resist rigid motions (elastic beds), shape (n_nodes, dim).
-        foundations: What each elastic foundation of the scene exerts, shape (n_nodes, dim) each.
-        moved: Displacement of the points of rigid surfaces by body and surface, shape (dim,), [length]; their
-            loads act there; at undeformed ones where they are not among them.
-        springs: What springs of tools exert that are not among the beds, by body and surface.
+    rows of B leave prescribed components out). `places`: where the nodes of all bodies are for moments:
+    undeformed, on bodies that deform much deformed; `load`: f; thermal strain included, which has no
+    resultant; `reaction`: of supports, zero on free components; `contact`: on the slave at each contact
+    point; `joints`: of each joint, see `Joint.forces`; `bed`: what materials exert that resist rigid motions
+    (elastic beds); `foundations`: what each elastic foundation of the scene exerts; `moved`: displacement of
+    the points of rigid surfaces by body and surface; their loads act there; at undeformed ones where they are
+    not among them; `springs`: what springs of tools exert that are not among the beds, by body and surface.
     """
 
     places: np.ndarray
@@ -74,8 +67,7 @@ class NodalForces:
 def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndarray) -> NodalForces:
     """Return the forces on all nodes. Collective.
 
-    `multiplier`: λ, owned, [force]; `displacement`: torn displacement of this rank as the solver returned it,
-    shape (torn_size,), [length].
+    `displacement`: torn displacement of this rank as the solver returned it.
     """
     decomposition = torn.decomposition
     fixed, axes, contact = decomposition.fixed, decomposition.axes, _contact_forces(torn, multiplier)
@@ -113,10 +105,7 @@ def _contact_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
 
 
 def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Return the forces of chosen points on the nodes of slaves and masters, shape (n_nodes, dim).
-
-    `force`: force on the slave at each of all points, shape (n, dim), [force].
-    """
+    """Return the forces of chosen points on the nodes of slaves and masters, shape (n_nodes, dim)."""
     return points.part(chosen).on_nodes(force[chosen])
 
 
@@ -404,10 +393,8 @@ def foundation_forces(
 class SupportShare:
     """The part of a support in the reactions of nodes.
 
-    Attributes:
-        components: Its part in every component, shape (n_nodes, dim), zero where it holds nothing.
-        nodes: Nodes at which rollers hold, shape (k,).
-        matrices: Its parts in the reactions there, which take the place of these, shape (k, dim, dim).
+    `components`: its part in every component, zero where it holds nothing; `nodes`: nodes at which rollers
+    hold; `matrices`: its parts in the reactions there, which take the place of these.
     """
 
     components: np.ndarray
@@ -539,9 +526,8 @@ def force_balance(
 ) -> Balance:
     """Return the balance of all forces, about a point or the middle of the box around all bodies.
 
-    Radial forces all around an axis balance each other.
-
-    `least`: A force below which bodies count as free of forces, [force].
+    Radial forces all around an axis balance each other. `least`: a force below which bodies count as free of
+    forces.
     """
     if about is None:
         carriers = [isinstance(body, ToolBody) for body in torn.scene.bodies.values()]

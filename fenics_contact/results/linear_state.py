@@ -152,10 +152,9 @@ def _geometry_error(
     that the meshes carry, where facets or reconstructed surfaces were used; where there are none,
     reconstructed surfaces of the next order. Factors, coarse problem and preconditioner are those of the
     system. It is not a bound: the error of the facets' normals is left out, which matters where their gaps
-    happen to be right, as between mirrored bodies by mortar.
-
-    Returns distance in energy norm, [√(force · length)], and change of the largest contact pressure, relative
-    to that of the better geometry; zeros where shapes are known and used, and between flat surfaces.
+    happen to be right, as between mirrored bodies by mortar. Returns distance in energy norm, [√(force ·
+    length)], and change of the largest contact pressure, relative to that of the better geometry; zeros where
+    shapes are known and used, and between flat surfaces.
     """
     torn = system.torn
     if not isinstance(system, DualSystem) or not isinstance(solution, DualSolution) or not torn.points.count:

@@ -58,11 +58,10 @@ def multi_block(
 
 
 def body_grid(mesh: BodyMesh, points: np.ndarray, *, by_shapes: bool = False) -> pyvista.UnstructuredGrid:
-    """Return the cells of a body on points in space, (n_nodes, 3), as pyvista's UnstructuredGrid.
+    """Return the cells of a body on points in space as pyvista's UnstructuredGrid.
 
     Cells of several shapes are hexahedra (quadrilaterals) some of whose nodes coincide, unless `by_shapes`.
-
-    If nodes hang, it has their numbers and their masters as fields of its own, ``hanging_nodes``, (n,), and
+    If nodes hang, it has their numbers and their masters as fields of its own, ``hanging_nodes`` and
     ``hanging_masters``, (n, 2 | 4).
     """
     pv = _pyvista()

@@ -21,12 +21,8 @@ class CoarsePeak:
     Cylinders by mortar on meshes that do not match, the master's facets a third to five times as wide as the
     slave's, in 312 random positions: with one cell to the edge the largest pressure was off by 17 % in the
     median on quadrilaterals and 29 % on triangles (at most 85 % and 135 %), with two by 1.3 % and 5.4 % (13 %
-    and 23 %), with more by 0.2 % and 1.2 % (1.8 % and 3.5 %).
-
-    Attributes:
-        place: The surfaces of the pair.
-        points: How many points press.
-        cells: Cells from its point to the next open one, of the coarser surface, rounded up: 1 or 2.
+    and 23 %), with more by 0.2 % and 1.2 % (1.8 % and 3.5 %). `points`: how many points press; `cells`: cells
+    from its point to the next open one, of the coarser surface, rounded up: 1 or 2.
     """
 
     place: str
@@ -57,11 +53,8 @@ class CoarsePeak:
 class BetweenNodes:
     """A contact that lies between the nodes of its slave, or partly so.
 
-    Attributes:
-        place: The surfaces of the pair.
-        depth: By how much surfaces overlap inside a facet, deeper than at its nodes, [length].
-        moved: How far they move against each other, [length].
-        at: The deepest point, [length].
+    `depth`: by how much surfaces overlap inside a facet, deeper than at its nodes; `moved`: how far they move
+    against each other.
     """
 
     place: str
@@ -99,11 +92,7 @@ class BetweenNodes:
 class CornerBetweenNodes(BetweenNodes):
     """A corner or an edge of a master that presses between the nodes of its slave.
 
-    Attributes:
-        place: The surfaces of the pair.
-        depth: How far the corner lies inside the slave, deeper than nodes around, [length].
-        moved: How far it moves against the slave, [length].
-        at: The corner, [length].
+    `depth`: how far the corner lies inside the slave, deeper than nodes around.
     """
 
     can_be_small: ClassVar[bool] = False
@@ -123,11 +112,7 @@ class CornerBetweenNodes(BetweenNodes):
 class CornerKeptAway(BetweenNodes):
     """A corner or an edge of a master that does not touch the slave, which presses on it all the same.
 
-    Attributes:
-        place: The surfaces of the pair.
-        depth: How far the surfaces are apart, [length].
-        moved: How far they move against each other, [length].
-        at: The corner, [length].
+    `depth`: how far the surfaces are apart.
     """
 
     can_be_small: ClassVar[bool] = False
@@ -146,11 +131,7 @@ class CornerKeptAway(BetweenNodes):
 
 @dataclass(frozen=True)
 class UnmatchedNodes:
-    """Contact by nodes on linear meshes that do not match, whose pressures waver however fine these are.
-
-    Attributes:
-        place: The surfaces of the pair.
-    """
+    """Contact by nodes on linear meshes that do not match, whose pressures waver however fine these are."""
 
     place: str
 
@@ -164,12 +145,7 @@ class UnmatchedNodes:
 
 @dataclass(frozen=True)
 class FacetsOutside:
-    """Facets outside the surfaces of a pair that pass into its other body, where they would press.
-
-    Attributes:
-        place: The surfaces of the pair.
-        facets: How many there are between its two bodies.
-    """
+    """Facets outside the surfaces of a pair that pass into its other body, where they would press."""
 
     place: str
     facets: int

@@ -32,10 +32,7 @@ def turned_around(
     """Return the cells between a section and copies of it, turned around the axis, which becomes that of z.
 
     Fields with three values are vectors and those with six stresses, of the radius, the axis and the way
-    around it; others stay as they are.
-
-    `grid`: linear cells with x as the radius and y along the axis; `angle`: in degrees; `step`: largest
-    angle between two copies, in degrees.
+    around it; others stay as they are. `step`: largest angle between two copies, in degrees.
     """
     import pyvista as pv  # as `multi_block` does
 

@@ -55,10 +55,7 @@ def idle_motions(system: DualSystem, solution: DualSolution) -> tuple[UnheldMoti
 
 
 def rigid_motions(torn: TornSystem, fields: sp.spmatrix) -> tuple[UnheldMotion, ...]:
-    """Return rigid displacements of bodies as motions. Collective.
-
-    `fields`: torn displacements of this rank, one a column, shape (torn_size, n).
-    """
+    """Return rigid displacements of bodies, one a column of torn `fields`, as motions. Collective."""
     count, coefficients, fields = fields.shape[1], [], sp.csr_matrix(fields)
     starts = np.cumsum([0] + [part.mesh.size for part in torn.subdomains])
     for name, body in torn.scene.bodies.items():
@@ -133,8 +130,7 @@ def rigid_motion(
 ) -> RigidMotion:
     """Return the motion of a rigid surface.
 
-    `displacement`: displacement of the nodes of its body, shape (n_nodes, dim), [length]; `known`: U, then θ,
-    where they are known.
+    `known`: U, then θ, where they are known.
     """
     body, where = scene.bodies[support.body], Surface(support.body, support.surface)
     motion = known

@@ -119,7 +119,7 @@ def compute_energies(
 ) -> Energies:
     """Compute all energies. Collective.
 
-    `displacement`: torn displacement of this rank, [length]; `multiplier`: λ, owned, [force].
+    `displacement`: torn displacement of this rank; `multiplier`: λ, owned.
     """
     internal = torn.load - torn.force(multiplier)  # = K u
     strained = 0.5 * internal @ (displacement - rigid)
