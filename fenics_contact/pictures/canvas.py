@@ -124,10 +124,7 @@ def png_path(path: str | Path | None) -> Path | None:
 
 
 def draw_picture(comm: MPI.Comm | None, path: Path | None, draw: Callable[[BinaryIO], None]) -> Picture:
-    """Let rank 0 draw and write; if it fails, all ranks raise. Collective on ``comm`` if given.
-
-    `comm`: communicator, None if this rank draws for itself; `path`: PNG file to write, or None.
-    """
+    """Let rank 0 draw and write; if it fails, all ranks raise. Collective on ``comm`` if given."""
     png = None
     with nullcontext() if comm is None else together(comm):
         if comm is None or comm.rank == 0:
@@ -218,9 +215,8 @@ def _probe(environment: tuple[str | None, ...]) -> str:
 class View:
     """A direction of view.
 
-    Attributes:
-        towards: Unit vector from the scene to the viewer, (3,).
-        up: Unit vector that points up in the picture, perpendicular to it, (3,).
+    `towards`: unit vector from the scene to the viewer; `up`: unit vector that points up in the picture,
+    perpendicular to it.
     """
 
     towards: np.ndarray
@@ -242,12 +238,7 @@ IN_PLANE = View(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
 
 @dataclass(frozen=True)
 class Frame:
-    """The visible rectangle of a view.
-
-    Attributes:
-        low: Lower left corner in picture coordinates, (2,).
-        high: Upper right corner, (2,).
-    """
+    """The visible rectangle of a view, from its lower left to its upper right corner."""
 
     low: np.ndarray
     high: np.ndarray
@@ -285,11 +276,7 @@ def frame_around(view: View, points: np.ndarray, margin: float = 0.02) -> Frame:
 
 
 def looking_along(towards: np.ndarray, horizontal: np.ndarray) -> View:
-    """Return the view from a side in which a direction appears horizontal.
-
-    `towards`: from the scene to the viewer, (3,), any length; `horizontal`: direction that points right in
-    the picture, not parallel to it, (3,).
-    """
+    """Return the view towards a side in which the direction `horizontal` points right."""
     towards = towards / np.linalg.norm(towards)
     right = horizontal - (horizontal @ towards) * towards
     right /= np.linalg.norm(right)
@@ -309,10 +296,7 @@ def oblique_view(points: np.ndarray) -> View:
 
 
 def face_on(normal: np.ndarray) -> View:
-    """View a plane at right angles: z up if the plane is upright, else y up.
-
-    `normal`: from the plane to the viewer, (3,), any length.
-    """
+    """View a plane at right angles, from where its normal points: z up if it is upright, else y."""
     towards = normal / np.linalg.norm(normal)
     reference = np.array([0.0, 0.0, 1.0]) if abs(towards[2]) < 0.8 else np.array([0.0, 1.0, 0.0])
     return looking_along(towards, np.cross(reference, towards))
@@ -355,11 +339,7 @@ _STYLE = {
 
 @contextmanager
 def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Figure]:
-    """Open an empty figure with automatic layout, and save it at the end.
-
-    Yields:
-        The figure.
-    """
+    """Open an empty figure with automatic layout, and save it at the end."""
     dpi = size[0] / INCHES
     with mpl.rc_context({**mpl.rcParamsDefault, **_STYLE}):
         figure = Figure(figsize=(INCHES, size[1] / dpi), dpi=dpi, layout="constrained")
@@ -425,9 +405,7 @@ def render(
 ) -> np.ndarray:
     """Render one image of ``width`` pixels, with the directions of the axes in its corner if requested.
 
-    The proportions of the frame are those of the image.
-
-    Returns image, (height, width, 3) uint8, at `SUPERSAMPLING` times the resolution.
+    The proportions of the frame are those of the image, which has `SUPERSAMPLING` times the resolution.
     """
     size = [SUPERSAMPLING * width, max(2, round(SUPERSAMPLING * width / frame.proportion))]
     with rendering():

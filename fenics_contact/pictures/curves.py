@@ -130,18 +130,12 @@ STRAIGHT = np.cos(np.radians(60.0))
 class ContactTrace:
     """Contact quantities along the slave surface of a pair in the plane.
 
-    Attributes:
-        axis: Label of the positions: "x", "−y", of bodies of revolution "r" and "z", or "along the surface".
-        places: Positions of all nodes of the surface, ascending, (n,), [length].
-        pressure: On all nodes, zero where there is no contact point, (n,), [force / length²].
-        traction: Tangential traction on the slave in the direction of increasing positions; with torsion
-            its size, (n,).
-        bound: Friction bound of the traction, (n,).
-        slip: Slip of the contact points on the master in the last load step, in the direction of increasing
-            positions, with torsion its size, [length].
-        shear: Resultant of the traction, with torsion its torque about the axis.
-        revolved: Whether forces are those of a full revolution, elsewhere per thickness.
-        twists: Whether bodies of revolution may twist.
+    `axis`: label of the positions: "x", "−y", of bodies of revolution "r" and "z", or "along the surface";
+    `pressure`: on all nodes, zero where there is no contact point; `traction`: tangential traction on the
+    slave in the direction of increasing positions; with torsion its size; `slip`: slip of the contact points
+    on the master in the last load step, in the direction of increasing positions, with torsion its size;
+    `shear`: resultant of the traction, with torsion its torque about the axis; `revolved`: whether forces are
+    those of a full revolution, elsewhere per thickness.
     """
 
     name: str
@@ -216,12 +210,10 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
 
 
 def walk(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Order the nodes of directed edges along the curve.
+    """Order the nodes of directed edges along the curve; every node begins and ends at most one of them.
 
-    `edges`: pairs of nodes, (n, 2); every node begins and ends at most one of them.
-
-    Returns the nodes in order, piece by piece, and the first index of each piece, (n_pieces,). For a closed
-    curve the first node is not repeated.
+    Returns the nodes in order, piece by piece, and the first index of each piece. For a closed curve the
+    first node is not repeated.
     """
     nodes, local = np.unique(edges, return_inverse=True)
     local = local.reshape(edges.shape)

@@ -144,8 +144,6 @@ def outline(shape: SurfaceShape, points: np.ndarray) -> list[np.ndarray]:
     Of a plane the edge of the part under the bodies, of a sphere three circles, of a cylinder a circle at
     each end of the part near the bodies and four lines between them, of a box the edges of its faces, of
     other shapes in space sections near the bodies.
-
-    `points`: all nodes of the bodies, (n, dim).
     """
     if isinstance(shape, Plane):
         return [_edge(shape, points)]
@@ -212,9 +210,8 @@ def obstacle_layers(
 ) -> tuple[list[Layer], np.ndarray]:
     """Draw the outlines of obstacles in space, and planes as sheets.
 
-    A sheet seen from its free side lies behind all bodies; seen from behind it would hide them.
-
-    Returns layers to draw, and points that the picture should contain, (n, 3).
+    A sheet seen from its free side lies behind all bodies; seen from behind it would hide them. Returns also
+    points that the picture should contain.
     """
     layers: list[Layer] = []
     held = [np.zeros((0, 3))]
@@ -257,9 +254,8 @@ def _circle(centre: np.ndarray, axes: tuple[np.ndarray, np.ndarray], radius: flo
 class ColouredField:
     """The content of a picture of a field, apart from the bodies.
 
-    Attributes:
-        reach: Extent of details to each side of the contact's centre, [length], or None.
-        axes: Names of the coordinates of plane bodies, of bodies of revolution r and z.
+    `reach`: extent of details to each side of the contact's centre, or None; `axes`: names of the coordinates
+    of plane bodies, of bodies of revolution r and z.
     """
 
     values: Mapping[str, np.ndarray]
@@ -330,8 +326,7 @@ def draw_field_on_bodies(
 ) -> Picture:
     """Draw a field on all bodies, with details of a contact in true deformation. Collective on ``comm``.
 
-    `path`: PNG file to write, or None; `spot`: the contact of which a detail is drawn, in space two sections;
-    None for no detail; `comm`: communicator, None if this rank draws for itself.
+    `spot`: the contact of which a detail is drawn, in space two sections; None for no detail.
     """
     coloured = field.on(bodies)
     plane = all(map(is_plane, bodies.values()))

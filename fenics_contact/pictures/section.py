@@ -286,11 +286,7 @@ CLOSEST = 0.009
 def draw_field(
     axes: Axes, points: np.ndarray, cells: np.ndarray, values: np.ndarray, look: dict[str, Any]
 ) -> None:
-    """Colour plane cells by nodal or cell values.
-
-    `points`: coordinates, (n_nodes, 2); `cells`: node numbers, (n_cells, 3 | 4); `values`: shape (n_nodes,)
-    or (n_cells,).
-    """
+    """Colour plane cells by nodal or cell values."""
     if len(values) == len(points):
         mesh, shown = refined(points, cells, values)
         axes.tripcolor(mesh, shown, shading="gouraud", rasterized=True, **look)
@@ -326,10 +322,8 @@ def draw_outline(axes: Axes, points: np.ndarray, cells: np.ndarray, *, width: fl
 def without_seams(points: np.ndarray, edges: np.ndarray, slight: float = 1e-3) -> np.ndarray:
     """Return the edges of an outline without those between small and large cells, which lie inside.
 
-    On the edge of a large cell lie the ends of those of small ones.
-
-    `points`: coordinates, (n_points, dim); `edges`: their ends, (n, 2); `slight`: distance from an edge
-    relative to its length up to which a point lies on it.
+    On the edge of a large cell lie the ends of those of small ones. `slight`: distance from an edge relative
+    to its length up to which a point lies on it.
     """
     edges = edges[(points[edges[:, 0]] != points[edges[:, 1]]).any(axis=1)]  # on an axis some are points
     first, last = points[edges[:, 0]], points[edges[:, 1]]
@@ -379,12 +373,10 @@ _OUTLINE = (("white", 6), (INK, 3))
 class Spot:
     """Location and size of the contact of a pair.
 
-    Attributes:
-        centre: Force-weighted middle, (dim,); in space on the planes of symmetry that cut the contact.
-        normal: Mean unit normal, from master to slave, (dim,); in space within these planes.
-        radius: Radius of a disc, or half length of a line, of the size of the closed part of the surface,
-            [length].
-        inside: From planes of symmetry into the modelled part of the contact, 0 along other axes, (dim,).
+    `centre`: force-weighted middle, (dim,); in space on the planes of symmetry that cut the contact;
+    `normal`: mean unit normal, from master to slave, (dim,); in space within these planes; `radius`: radius
+    of a disc, or half length of a line, of the size of the closed part of the surface; `inside`: from planes
+    of symmetry into the modelled part of the contact, 0 along other axes, (dim,).
     """
 
     centre: np.ndarray
@@ -397,9 +389,7 @@ class Spot:
 class Section:
     """A plane through bodies.
 
-    Attributes:
-        origin: A point of it, (3,).
-        inside: Side to which it is shifted slightly, (3,).
+    `inside`: side to which it is shifted slightly.
     """
 
     view: View
@@ -421,8 +411,6 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
     """Return the contact of the pair with the largest normal force.
 
     In space planes of symmetry count: half a contact's middle lies on the plane that halves it.
-
-    `places`: positions of the contact points, (n, dim), [length].
     """
     force, points = contact.normal_force, contact.points
     pair, dim = int(np.argmax(np.bincount(points.pair, weights=force))), places.shape[1]
@@ -475,8 +463,7 @@ def sections_of(spot: Spot, main: View) -> list[Section]:
 def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | None = None) -> Frame:
     """Return the frame around a contact, limited to the visible bodies.
 
-    `points`: all nodes of the bodies, (n, 3); `reach`: extent up and down, [length]; by default five times
-    the radius of the contact.
+    `reach`: extent up and down; by default five times the radius of the contact.
     """
     bodies = frame_around(view, points, 0.0)
     middle = view.project(spot.centre[None])[0]

@@ -545,10 +545,7 @@ def _words(patch: ContactPatch, units: Units) -> str:
 
 
 def draw_status(axes: Axes, patch: ContactPatch, *, counted: bool = True) -> np.ndarray:
-    """Draw projected facets, a symbol on each contact point, and arrows for slip.
-
-    Returns how high the tips of the arrows are, (n,), [length].
-    """
+    """Draw projected facets, symbols on contact points, arrows for slip; return how high their tips are."""
     axes.add_collection(PolyCollection(patch.places[patch.facets], facecolors=PALE, edgecolors="white"))
     places = patch.places[patch.points]
     for status, (name, look) in symbols_of(patch.rubs).items():

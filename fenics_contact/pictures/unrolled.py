@@ -48,11 +48,8 @@ ROUND = 0.1
 class Unrolling:
     """A cylinder that is cut open along a line.
 
-    Attributes:
-        centre: A point of its axis, (3,), [length].
-        frame: Direction of angle 0, direction of a quarter turn, and axis as rows, (3, 3), right-handed.
-        radius: [length].
-        middle: Angle opposite of the cut, [rad].
+    `frame`: direction of angle 0, direction of a quarter turn, and axis as rows, right-handed; `middle`:
+    angle opposite of the cut.
     """
 
     centre: np.ndarray
@@ -68,10 +65,8 @@ class Unrolling:
     def unroll(self, points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Unroll a surface; facets that the cut runs through stay whole, and their nodes are there twice.
 
-        `points`: nodes of the body, (n, 3); `facets`: facets of linear shape, (m, 3 | 4).
-
-        Returns the node of every place, (k,); the places, (k, 2); facets as rows of places. The first place
-        of a node is within half a turn of the middle, if a facet is there.
+        Returns the node of every place, the places, and facets as rows of places. The first place of a node
+        is within half a turn of the middle, if a facet is there.
         """
         angles = self.angles(points)
         around = self.angles(points[facets].mean(axis=1))
@@ -102,8 +97,7 @@ def unrolling_of(
 ) -> Unrolling | None:
     """Fit a cylinder to a surface that runs around an axis; None if it does not.
 
-    `points`: nodes of the body, (n, 3), [length]; `facets`: facets of linear shape, (m, 3 | 4); `places`:
-    where forces act on it, (k, 3): the cut is opposite of their middle; `force`: their sizes, (k,).
+    `places`: where forces act on it: the cut is opposite of their middle.
     """
     areas = vector_areas(points, facets)
     size = np.linalg.norm(areas, axis=1)
@@ -148,11 +142,8 @@ def _half_turn(angles: np.ndarray) -> np.ndarray:
 class ContactPatch:
     """The slave surface projected to a plane or unrolled, and its contact points.
 
-    Attributes:
-        unrolling: How the surface is unrolled instead, or None.
-        places: All nodes of the surface in the picture, (n, 2).
-        pressure: On all nodes of the surface, interpolated at the corners of quadratic triangles, (n,).
-        slip: Of the contact points in the picture, (n_points, 2).
+    `unrolling`: how the surface is unrolled instead, or None; `places`: all nodes of the surface in the
+    picture; `pressure`: on all nodes of the surface, interpolated at the corners of quadratic triangles.
     """
 
     view: View
