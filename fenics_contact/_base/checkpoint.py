@@ -259,9 +259,7 @@ class Interrupted(SystemExit):
 class Interruption:
     """Handles signals and records the first one until the run can stop.
 
-    Attributes:
-        comm: Communicator of the run; rank 0 logs.
-        requested: Number of the received signal, 0 if none.
+    `requested`: number of the received signal, 0 if none.
     """
 
     def __init__(self, comm: MPI.Comm | None) -> None:
@@ -287,10 +285,7 @@ class Interruption:
         save: Callable[[], None] | None = None,
         comm: MPI.Comm | None = None,
     ) -> None:
-        """Stop here if a rank received a signal. Collective on the communicator.
-
-        `comm`: communicator whose ranks agree; that of the run by default.
-        """
+        """Stop here if a rank received a signal. Collective on the communicator, by default the run's."""
         self._kept = kept()
         comm = comm or self.comm
         number = self.requested if comm is None or comm.size == 1 else max(comm.allgather(self.requested))

@@ -205,9 +205,7 @@ def count_flops(comm: MPI.Comm, number: int) -> None:
 def count_of_exchange(comm: MPI.Comm, owner: np.ndarray) -> tuple[int, int]:
     """Return the messages that this rank sends or receives if ranks exchange numbers, and their bytes.
 
-    Collective on ``comm``.
-
-    `owner`: rank, not this one, that owns each number that this rank shares, shape (n,).
+    Collective on ``comm``. `owner`: rank, not this one, that owns each number that this rank shares.
     """
     if comm.size == 1:
         return 0, 0

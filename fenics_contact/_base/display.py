@@ -60,11 +60,8 @@ def in_notebooks(cls: Class) -> Class:
 class Table:
     """A table of text.
 
-    Attributes:
-        rows: Cells of each row, all rows of one length; the first has the names of the columns.
-        names: Number of columns that are words and lie to the left; numbers lie to the right.
-        notes: Lines behind it.
-        headed: Whether the first row has names.
+    `names`: number of columns that are words and lie to the left; numbers lie to the right; `notes`: lines
+    behind it; `headed`: whether the first row has names.
     """
 
     rows: Sequence[tuple[str, ...]]

@@ -78,7 +78,7 @@ def remove_abandoned(folder: Path, abandoned: float = 24 * 3600.0) -> None:
     """Remove the hidden folders of dead writers.
 
     `abandoned`: on file systems without locks, age at which a folder counts as abandoned: no write takes that
-    long, [s].
+    long.
     """
     for left in folder.glob(".*.partial"):
         if not _HIDDEN.fullmatch(left.name) or not left.is_dir():

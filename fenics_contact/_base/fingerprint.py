@@ -110,11 +110,7 @@ def _class(value: Any) -> str:
 
 
 def require_alike(comm: MPI.Comm, descriptions: Mapping[str, str]) -> None:
-    """Reject input that differs from rank to rank. Collective on ``comm``.
-
-    `comm`: communicator of the ranks that must have the same input; `descriptions`: this rank's input, from
-    `described`.
-    """
+    """Reject input, see `described`, that differs from rank to rank. Collective on ``comm``."""
     if comm.size == 1:
         return
     digest = hashlib.sha256(repr(list(descriptions.items())).encode()).digest()

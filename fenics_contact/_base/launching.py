@@ -101,11 +101,7 @@ def sharing_launcher(ranks: int) -> list[str]:
 
 @dataclass(frozen=True)
 class FinishedProcess:
-    """How a process ended.
-
-    Attributes:
-        status: Its exit status, None if it did not end in time.
-    """
+    """How a process ended; no status if it did not end in time."""
 
     status: int | None
     output: str

@@ -8,18 +8,12 @@ from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit
 
 
 def available_memory(table: Path = Path("/proc/meminfo")) -> float | None:
-    """Return the memory that programs can still take, [bytes]; None where the system does not say.
-
-    `table`: where Linux lists its memory.
-    """
+    """Return the memory that programs can still take, [bytes]; None where the system does not say."""
     return _listed(table, "MemAvailable")
 
 
 def addressable_memory(status: Path = Path("/proc/self/status")) -> float | None:
-    """Return how much more this process may address, [bytes]; None without a limit such as ``ulimit -v``.
-
-    `status`: where Linux says what the process has.
-    """
+    """Return how much more this process may address, [bytes]; None without a limit (``ulimit -v``)."""
     limit, _ = getrlimit(RLIMIT_AS)
     taken = _listed(status, "VmSize")
     return None if limit == RLIM_INFINITY or taken is None else max(limit - taken, 0.0)

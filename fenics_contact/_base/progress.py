@@ -45,11 +45,8 @@ class Kind(Enum):
 class Event:
     """One report. Unknown numbers are None.
 
-    Attributes:
-        task: Identifies a piece of work among those under way.
-        most: Largest number, if the total is unknown.
-        measure: Quantity that must become small: the residual.
-        value: Best value so far, of an optimisation.
+    `most`: largest number, if the total is unknown; `measure`: quantity that must become small: the residual;
+    `value`: best value so far, of an optimisation.
     """
 
     task: int
@@ -162,10 +159,7 @@ _OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u206
 
 
 def duration(seconds: float | None) -> str:
-    """Format a duration: 0.4 s, 8 s, 3 min, 1.5 h.
-
-    `seconds`: the duration, None if unknown.
-    """
+    """Format a duration: 0.4 s, 8 s, 3 min, 1.5 h."""
     if seconds is None:
         return "?"
     if 0.05 <= seconds < 0.95:
@@ -192,12 +186,7 @@ def visible(text: str) -> str:
 
 @dataclass
 class Work:
-    """A piece of work under way: its last event, completed from earlier ones.
-
-    Attributes:
-        begun: Time of its start, [s].
-        stepped: Time of its last event, [s].
-    """
+    """A piece of work under way: its last event, completed from earlier ones, and times, [s]."""
 
     event: Event
     begun: float

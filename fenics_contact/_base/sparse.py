@@ -30,12 +30,10 @@ PRODUCTS = 100
 class Rates:
     """Rates of one core with OpenBLAS, other cores idle, caches cold.
 
-    Attributes:
-        factor: Seconds to factor a sparse matrix of n dofs of a solid, divided by n^1.37.
-        substitution: Seconds for forward and backward substitution, divided by n^1.3.
-        condensation: Time to form a Schur complement relative to that of factoring the whole matrix.
-        dense: Floating point operations per second of a dense factorisation and inversion.
-        stream: Bytes per second that the product with a packed triangle reads.
+    `factor`: seconds to factor a sparse matrix of n dofs of a solid, divided by n^1.37; `substitution`:
+    seconds for forward and backward substitution, divided by n^1.3; `condensation`: time to form a Schur
+    complement relative to that of factoring the whole matrix; `stream`: bytes per second that the product
+    with a packed triangle reads.
     """
 
     factor: float = 0.75e-6
@@ -55,8 +53,7 @@ MEASURED = Rates()
 class LocalCost:
     """Cost of one subdomain.
 
-    Attributes:
-        product: Seconds to apply K⁺ and S once each on the interface.
+    `product`: seconds to apply K⁺ and S once each on the interface.
     """
 
     setup: float
@@ -127,8 +124,8 @@ def dispose_with(
 ) -> None:
     """Destroy PETSc objects when their owner is no longer used.
 
-    `comm`: communicator they live on, or None for this rank alone. Objects of one rank are destroyed at once,
-    others by `sweep`; they must be registered by all ranks in the same order.
+    Objects of one rank, without `comm`, are destroyed at once, others by `sweep`; they must be registered by
+    all ranks in the same order.
     """
     finalizer: Any
     if comm is None or comm.size == 1:
@@ -226,10 +223,7 @@ def _with_values(matrix: sp.csr_matrix, values: np.ndarray) -> sp.csr_matrix:
 
 
 def sent(comm: MPI.Comm, receiver: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the rows of columns that all ranks send to this one, in their order. Collective on ``comm``.
-
-    `receiver`: rank that receives each row, shape (n,); `columns`: shape (n,) each.
-    """
+    """Return the rows of columns that all ranks send to this one, in their order. Collective on ``comm``."""
     if comm.size == 1:
         return columns
     order, counts = np.argsort(receiver, kind="stable"), np.bincount(receiver, minlength=comm.size)
@@ -254,19 +248,17 @@ _subsets: dict[tuple[int, int], MPI.Comm] = {}
 class SharedFactor:
     """LU factors of Σ A_rank by MUMPS on the first ranks of a communicator.
 
-    Attributes:
-        holders: Number of ranks that hold the factors.
-        flops: Floating point operations of one solution on this rank, refined once.
+    `holders`: number of ranks that hold the factors; `flops`: floating point operations of one solution on
+    this rank, refined once.
     """
 
     def __init__(
         self, comm: MPI.Comm, share: sp.csr_matrix, scale: Vector, *, holders: int | None = None
     ) -> None:
-        """Sum the shares and factor. Collective on ``comm``.
+        """Sum the shares and factor. Collective on ``comm``, the ranks that use the factors.
 
-        `comm`: communicator of the ranks that use the factors; `share`: this rank's summand, shape (m, m);
-        `scale`: positive factors for rows and columns that bring the entries to order one, shape (m,),
-        replicated; `holders`: ranks that hold the factors; one for every `ROWS_PER_RANK` rows by default.
+        `scale`: positive factors for rows and columns that bring the entries to order one, replicated;
+        `holders`: one for every `ROWS_PER_RANK` rows by default.
         """
         start(comm)
         self._comm, self.size, self._scale = comm, share.shape[0], scale
@@ -281,11 +273,9 @@ class SharedFactor:
             self._factor(rows)
 
     def solve(self, right: Vector, *, refine: bool = True) -> Vector:
-        """Return A⁻¹ times a replicated vector, shape (m,), replicated. Collective.
+        """Return A⁻¹ times a replicated vector, replicated. Collective.
 
-        Args:
-            right: Right side, the same on every rank.
-            refine: Correct for the shift.
+        `refine`: correct for the shift.
         """
         check_not_forked()
         solution = np.empty(self.size)
