@@ -45,8 +45,7 @@ LOOKS = {
 class Series:
     """Some runs of a study.
 
-    Attributes:
-        symbol: Its symbol, so that colours are not needed.
+    `symbol`: its symbol, so that colours are not needed.
     """
 
     name: str
@@ -157,12 +156,7 @@ def against(errors: Errors, quantity: str) -> str:
 
 
 def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
-    """Return the indices of the Pareto-optimal points, by rising cost.
-
-    Args:
-        costs: Cost of each point, (n,).
-        errors: Error of each point, (n,).
-    """
+    """Return the indices of the Pareto-optimal points, by rising cost."""
     front: list[int] = []
     for number in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):
         if not front or errors[number] < errors[front[-1]]:
@@ -350,11 +344,7 @@ def _mesh(run: Run) -> str:
 def draw_stacked(
     axes: Any, bars: Sequence[Mapping[str, float]], names: Sequence[str], unit: str = ""
 ) -> None:
-    """Draw stacked bars of phases, with the sum above them.
-
-    Args:
-        bars: Time of every phase, by bar.
-    """
+    """Draw stacked bars of phases, with the sum above them."""
     phases = dict.fromkeys(phase for bar in bars for phase in bar)
     others = [phase for phase in phases if phase not in ORDER]
     colours, below = COLOURS | dict(zip(others, MORE, strict=False)), [0.0] * len(bars)

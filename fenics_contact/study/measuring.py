@@ -50,10 +50,7 @@ def _solver(parameters: Parameters) -> DualSolver | None:
 
 
 def cut(scene: Scene, subdomains: int | None, ranks: int) -> dict[str, np.ndarray] | None:
-    """Cut the bodies into about the given number of subdomains in total, in proportion to their cells.
-
-    Returns body name -> subdomain of every cell; None where no number is given.
-    """
+    """Cut the bodies into about so many subdomains, in proportion to their cells; None without a number."""
     if subdomains is None:
         return None
     meshes = {name: body.mesh for name, body in scene.bodies.items()}
@@ -106,12 +103,9 @@ EXACT = (1e-11, 1e-10, 1e-9)
 class TrueErrors:
     """Energy norms of displacement errors over that of the displacement.
 
-    The larger one of the torn displacement and of that of the fields is used.
-
-    Attributes:
-        algebraic: Distance from the solution for the state's own slip bounds.
-        total: Distance from the solution of the friction law, including the error of the slip bounds.
-        uncertainty: Error of these reference solutions, by their own certificates.
+    The larger one of the torn displacement and of that of the fields is used. `algebraic`: distance from the
+    solution for the state's own slip bounds; `total`: from that of the friction law; `uncertainty`: error of
+    these reference solutions, by their own certificates.
     """
 
     algebraic: float
@@ -123,7 +117,7 @@ class TrueErrors:
 def true_errors(states: tuple[State, ...]) -> TrueErrors | None:
     """Solve the last step again, as exactly as possible, and compare. Collective.
 
-    Returns the errors; None where no such solution could be computed.
+    None where no such solution could be computed.
     """
     state = states[-1]
     if not isinstance(state, LinearState) or not isinstance(state.solution, DualSolution):

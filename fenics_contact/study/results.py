@@ -150,10 +150,8 @@ LARGEST_FACTOR = 10.0
 class CertificateCheck:
     """The certificates of all runs compared with the true errors.
 
-    Attributes:
-        checked: Number of runs of which both are known.
-        unknown: Number of runs without one of them.
-        smallest_factor: Smallest ratio of the certificate to the true error, 1 or more if it is a bound.
+    `unknown`: number of runs without one of them; `smallest_factor`: smallest ratio of the certificate to the
+    true error, 1 or more if it is a bound.
     """
 
     checked: int
@@ -201,10 +199,8 @@ ROUNDING = 1e-12
 class Extrapolation:
     """The limit of f(h) = f₀ + C hᵖ through the three finest meshes.
 
-    Attributes:
-        value: f₀; that of the finest mesh where it could not be extrapolated.
-        rate: p, None if there is none.
-        refused: Why nothing was extrapolated; empty if it was.
+    `value`: f₀; that of the finest mesh where it could not be extrapolated; `rate`: p, None if there is none;
+    `refused`: why nothing was extrapolated; empty if it was.
     """
 
     value: float
@@ -214,8 +210,6 @@ class Extrapolation:
 
 def extrapolate(spacing: Sequence[float], values: Sequence[float]) -> Extrapolation:
     """Extrapolate to h = 0 by Richardson's rule with the measured rate.
-
-    `spacing`: mesh sizes, falling, (n,); `values`: values on them, (n,).
 
     References:
         P. J. Roache, Quantification of uncertainty in computational fluid dynamics, Annu. Rev. Fluid Mech.
@@ -246,10 +240,7 @@ def extrapolate(spacing: Sequence[float], values: Sequence[float]) -> Extrapolat
 
 
 def measured_rate(spacing: Sequence[float], errors: Sequence[float]) -> float | None:
-    """Return the slope of errors over mesh sizes in logarithms, fitted to the three finest meshes.
-
-    `spacing`: mesh sizes, falling, (n,); `errors`: errors on them, positive, (n,).
-    """
+    """Return the slope of errors over mesh sizes in logarithms, fitted to the three finest meshes."""
     h, e = np.asarray(spacing, dtype=np.float64)[-3:], np.asarray(errors, dtype=np.float64)[-3:]
     if len(h) < 2 or not np.all(e > 0.0):
         return None
@@ -260,11 +251,9 @@ def measured_rate(spacing: Sequence[float], errors: Sequence[float]) -> float | 
 class Reference:
     """The reference value of a quantity.
 
-    Attributes:
-        kind: "extrapolated", "finest mesh", or the source of the true value, such as "theory".
-        value: Its value; None for an exact one, which may differ from run to run.
-        rate: Rate of the extrapolation, None without one.
-        true: Whether it is an exact value, which every run stores with its own.
+    `kind`: "extrapolated", "finest mesh", or the source of the true value, such as "theory"; `value`: its
+    value; None for an exact one, which may differ from run to run; `true`: whether it is an exact value,
+    which every run stores with its own.
     """
 
     kind: str

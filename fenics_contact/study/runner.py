@@ -38,13 +38,11 @@ logger = logging.getLogger(__name__)
 class Job:
     """A measurement.
 
-    Attributes:
-        function: Function called on all ranks, ``"module:function"``, with the communicator and the
-            arguments. It returns a mapping that JSON can hold, the same on every rank.
-        first: Additional ones for the first measurement only.
-        ranks: MPI ranks; 0: one process without MPI, whose function receives None for the communicator.
-        threads: BLAS threads of each rank; None: one, unless the environment sets another number.
-        short: Duration, [s], from which it is measured only once, as disturbances matter little.
+    `function`: function called on all ranks, ``"module:function"``, with the communicator and the arguments.
+    It returns a mapping that JSON can hold, the same on every rank. `first`: additional ones for the first
+    measurement only; `ranks`: MPI ranks; 0: one process without MPI, whose function receives None for the
+    communicator; `threads`: BLAS threads of each rank; None: one, unless the environment sets another number;
+    `short`: duration, [s], from which it is measured only once, as disturbances matter little.
     """
 
     name: str
@@ -60,16 +58,11 @@ class Job:
 
 
 def measure(job: Job, *, first: bool = True) -> Record:
-    """Measure once.
+    """Measure once; `first`: whether to use the arguments of the first measurement.
 
-    Args:
-        job: The measurement.
-        first: Whether to use the arguments of the first measurement.
-
-    Returns:
-        The result of the function, with ranks, ``peak_memory`` and ``import_memory`` of all ranks together,
-        [byte], and the machine's ``load_average`` over the minute before; or ``failed`` with ``kind`` and
-        ``message``.
+    Returns the result of the function, with ranks, ``peak_memory`` and ``import_memory`` of all ranks
+    together, [byte], and the machine's ``load_average`` over the minute before; or ``failed`` with ``kind``
+    and ``message``.
     """
     load = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:
@@ -129,8 +122,7 @@ def fingerprint(files: Iterable[Path]) -> str:
 class Store:
     """Finished measurements on disk, one file each.
 
-    Attributes:
-        mark: Mark of the measured code, see `fingerprint`.
+    `mark`: mark of the measured code, see `fingerprint`.
     """
 
     folder: Path
@@ -196,8 +188,6 @@ def measure_all(
 
     A job is repeated only after all others were measured, so that a temporary load does not affect one job
     only.
-
-    `stream`: stream for progress; stderr by default.
     """
     launcher(max(job.ranks for job in jobs) or 1)  # raises if the ranks cannot be started
     for repeat in range(max(job.repeats for job in jobs)):
@@ -317,10 +307,7 @@ def run_study(
 class StudyPlan:
     """A study that can be measured.
 
-    Attributes:
-        base: Settings around which one at a time is varied.
-        store: Store of the measurements, marked with the code at the start.
-        ranks: MPI ranks of every run.
+    `base`: settings around which one at a time is varied.
     """
 
     study: StudyScene

@@ -87,10 +87,7 @@ def build(parameters: Parameters, comm: MPI.Comm | None = None) -> Problem:
 class Theory:
     """Theoretical values for the measured forces P and Q of a state.
 
-    Attributes:
-        half_width: a, [length].
-        stick: c, [length].
-        peak: p0, [force / length²].
+    `half_width`: a; `stick`: c; `peak`: p0.
     """
 
     half_width: float

@@ -31,9 +31,7 @@ TURNED = {
 def nested_box(core: float, size: float, count: int, cell: str = "hexahedron") -> BodyMesh:
     """Mesh the cube [0, size]³: equal cells near the origin, layers around them that grow with the distance.
 
-    `core`: side of the cube of equal cells, [length]; `size`: side of the body, [length].
-
-    Returns the mesh with surfaces ``x0, x1, y0, y1, z0, z1``.
+    `core`: side of the cube of equal cells. Surfaces are ``x0, x1, y0, y1, z0, z1``.
     """
     inner = box_lattice([np.linspace(0.0, core, count + 1)] * 3)
     sides = [_facing(inner, axis) for axis in range(3)]
@@ -53,8 +51,7 @@ def nested_box(core: float, size: float, count: int, cell: str = "hexahedron") -
 def nested_half(core: float, size: float, count: int, cell: str = "quadrilateral") -> BodyMesh:
     """Mesh the rectangle [−size, size] × [0, size] in the same way.
 
-    `core`: half the width and the height of the rectangle of equal cells, [length]; `size`: half the width
-    and the height of the body, [length].
+    `core`: half the width, and the height, of the rectangle of equal cells.
     """
     inner = rectangle_lattice([np.linspace(-core, core, 2 * count + 1), np.linspace(0.0, core, count + 1)])
     sides = [inner.surfaces[side] for side in ("x0", "x1", "y1")]
@@ -72,8 +69,7 @@ def _shells(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Enlarge the skin of the core, layer by layer.
 
-    Returns all points; the nodes of the skin, ascending, shape (n,); the nodes of all layers, that of the
-    core first, shape (n_layers + 1, n).
+    Returns all points; the nodes of the skin, ascending; and the nodes of all layers, that of the core first.
     """
     skin = np.unique(np.concatenate([facets.ravel() for facets in sides]))
     layers = max(1, round(np.log(size / core) / np.log1p(1.0 / count)))
@@ -87,9 +83,8 @@ def _facing(inner: BodyMesh, axis: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the facets of the core normal to an axis, and the positions of their nodes in a hexahedron.
 
     Cells of all layers are numbered along the axes like those of a lattice, with the outward direction in
-    place of their own axis, so that all can be split alike.
-
-    Returns facets, (n, 4), and the vertex numbers of their inner copies, then of their outer ones, (n, 8).
+    place of their own axis, so that all can be split alike. The positions are those of the inner copies, then
+    of the outer ones.
     """
     facets = inner.surfaces[f"{'xyz'[axis]}1"]
     corners = inner.points[facets]
