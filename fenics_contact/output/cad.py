@@ -42,10 +42,9 @@ class CadError(InvalidDesignError):
 class SplineFit:
     """A B-spline of degree five with the same clamped knots along all parameters, from 0 to 1.
 
-    Attributes:
-        points: Control points, (n, n, 3), of a curve in the plane (n, 2), [length].
-        knots: Knots, each as often as it counts, (n + 6,).
-        deviation: Largest distance from the surface, at points between those that it interpolates, [length].
+    `points`: control points, (n, n, 3), of a curve in the plane (n, 2), [length]; `knots`: knots, each as
+    often as it counts; `deviation`: largest distance from the surface, at points between those that it
+    interpolates.
     """
 
     points: np.ndarray
@@ -136,9 +135,8 @@ def _orientations(grid: np.ndarray) -> np.ndarray:
 class Edge:
     """An edge of a flat side.
 
-    Attributes:
-        nodes: Its nodes in the order of the loop, the body's side on the left, (n,).
-        surface: Number of the designed surface that it borders on, None for a straight line.
+    `nodes`: its nodes in the order of the loop, the body's side on the left; `surface`: number of the
+    designed surface that it borders on, None for a straight line.
     """
 
     nodes: np.ndarray
@@ -157,10 +155,9 @@ class Edge:
 class FlatSide:
     """A flat side: its edges in closed loops, that around it first, and its plane.
 
-    Attributes:
-        off: Largest distance of the moved nodes from it, in the plane from its straight edges, [length].
-        normal: Unit normal out of the body, (3,); None in the plane.
-        level: Distance of its plane from the origin along the normal, [length].
+    `off`: largest distance of the moved nodes from it, in the plane from its straight edges; `normal`: unit
+    normal out of the body; None in the plane; `level`: distance of its plane from the origin along the
+    normal.
     """
 
     loops: list[list[Edge]]
@@ -289,10 +286,7 @@ Plane: TypeAlias = tuple[np.ndarray, float]
 
 
 def corners_in_planes(points: np.ndarray, sides: Sequence[FlatSide]) -> dict[int, np.ndarray]:
-    """Return the position of every corner of flat sides in all of their planes, by node.
-
-    `points`: coordinates of the nodes, shape (n_nodes, dim), [length].
-    """
+    """Return the position of every corner of flat sides in all of their planes, by node."""
     planes: dict[int, list[Plane]] = {}
     for side in sides:
         for edge in (edge for loop in side.loops for edge in loop):

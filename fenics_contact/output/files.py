@@ -39,13 +39,10 @@ class OutputError(FenicsContactError, OSError):
 
 @contextmanager
 def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
-    """Yield paths to write to, and move the written files to the targets at the end.
+    """Yield hidden paths beside the targets, and move the written files there at the end.
 
     If the block raises, the targets are unchanged. Each file is replaced atomically. Of several the last must
     be one that refers to the others: it exists only while all the others do.
-
-    Yields:
-        For every target a path of the same name in a hidden folder beside it.
     """
     folder = targets[0].parent
     try:

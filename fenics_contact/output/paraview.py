@@ -44,9 +44,8 @@ FIELD_FILES = (".vtu", ".vtm", ".pvd")
 class StoredFields:
     """A file with the fields of one state.
 
-    Attributes:
-        value: Its time, load factor or number in a series, 0 where there is none.
-        label: Its description in a series, such as the name of a load step; ParaView's field datum "Name".
+    `value`: its time, load factor or number in a series, 0 where there is none; `label`: its description in a
+    series, such as the name of a load step; ParaView's field datum "Name".
     """
 
     file: Path
@@ -152,8 +151,8 @@ LONGEST = 200
 def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) -> dict[str, Path]:
     """Name one file for each body: "state_link_1.vtu" for the body "link 1".
 
-    Returns body name -> file. Names that differ only in special characters are numbered, those that no disk
-    takes are cut and end in a number made from the whole name.
+    Names that differ only in special characters are numbered, those that no disk takes are cut and end in a
+    number made from the whole name.
     """
     files: dict[str, Path] = {}
     for body in bodies:

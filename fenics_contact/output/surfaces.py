@@ -45,10 +45,9 @@ def moved_surfaces(problem: ShapeProblem | JointProblem, alpha: np.ndarray) -> t
 def moved_body(
     problem: ShapeProblem | JointProblem, alpha: np.ndarray, body: str | None
 ) -> tuple[str, BodyMesh]:
-    """Return the name and the mesh of a designed body in the shape of a design. Collective.
+    """Return name and mesh of a designed body in the shape of a design. Collective.
 
-    `alpha`: design variables, shape (size,), [length]; `body`: name of the body; may be None if designs move
-    only one.
+    `body`: may be None if designs move only one.
     """
     designed = sorted({design.body for design in problem.designs})
     if body not in designed and (body is not None or len(designed) > 1):
