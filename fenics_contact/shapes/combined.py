@@ -216,12 +216,9 @@ class Placed:
 def placed(
     shape: SurfaceShape, rotation: np.ndarray | None, translation: Sequence[float], scale: float = 1.0
 ) -> SurfaceShape:
-    """Move a shape: its points x are mapped to scale R x + translation.
+    """Move a shape: its points x are mapped to scale R x + translation, with an orthogonal R.
 
-    `shape`: any shape; `rotation`: the orthogonal matrix R, shape (dim, dim); None for no rotation;
-    `translation`: image of the origin, dim entries, [length].
-
-    Returns the moved shape; a placed shape has the combined motion, the parts of a joined one are moved.
+    A placed shape has the combined motion, the parts of a joined one are moved.
     """
     turn = np.eye(len(translation)) if rotation is None else np.asarray(rotation, dtype=np.float64)
     moved = Placed(shape, tuple(floats(row) for row in np.atleast_2d(turn)), tuple(translation), scale)
@@ -259,10 +256,8 @@ CLOSE = 1e-9
 def recognised(points: np.ndarray, normals: np.ndarray) -> SurfaceShape | None:
     """Return the plane, sphere, cylinder, cone or torus on which points lie; in the plane the line or circle.
 
-    `points`: points of the surface, (n, 3 | 2), many more than a shape has parameters, [length]; `normals`:
-    their unit normals out of the body, (n, 3 | 2).
-
-    Returns the shape, or None if points lie off all of them by more than a billionth of their extent.
+    None if points, many more than a shape has parameters, lie off all of them by more than a billionth of
+    their extent. `normals`: unit normals out of the body.
     """
     size = float(np.ptp(points, axis=0).max())
     for fit in (_plane, _sphere, _about_an_axis):

@@ -34,13 +34,10 @@ FOCAL = 1e-12
 class Feet:
     """Feet of perpendiculars on a surface, and its derivatives there.
 
-    Attributes:
-        points: The projected points, (n, dim).
-        position: Feet, (n, dim).
-        tangents: First derivatives of the parametrisation there, (n, dim, dim − 1).
-        bends: Second derivatives, (n, dim, dim − 1, dim − 1).
-        free: Which parameters are not held at the border, (n, dim − 1); the continuation beyond is straight.
-        sign: 1, or −1 where the normal that the parametrisation gives points into the body; or one per point.
+    `position`: feet; `tangents`: first derivatives of the parametrisation there, (n, dim, dim − 1); `bends`:
+    second derivatives, (n, dim, dim − 1, dim − 1); `free`: which parameters are not held at the border, (n,
+    dim − 1); the continuation beyond is straight; `sign`: 1, or −1 where the normal that the parametrisation
+    gives points into the body; or one per point.
     """
 
     points: np.ndarray
@@ -201,12 +198,7 @@ class Patch(ABC):
 
 
 def tensor_grid(ticks: Iterable[ArrayLike]) -> np.ndarray:
-    """Return all points of which each coordinate is one of its ticks, the last coordinate running fastest.
-
-    `ticks`: the ticks of each coordinate, k rows of shape (n_i,).
-
-    Returns the points, shape (n_1 ··· n_k, k).
-    """
+    """Return all points of which each coordinate is one of its ticks, the last one running fastest."""
     axes = np.meshgrid(*map(np.asarray, ticks), indexing="ij")
     return np.stack(axes, axis=-1).reshape(-1, len(axes))
 
@@ -250,11 +242,7 @@ class Parametric(Patch):
     samples: int = 64
 
     def __post_init__(self) -> None:
-        """Reject an empty range, and an invalid position.
-
-        Raises:
-            InvalidInputError: If the range is empty, or the samples are not finite points.
-        """
+        """Reject an empty range, and samples that are not finite points."""
         count = len(self.lower)
         numbers = count == len(self.upper) and np.isfinite([*self.lower, *self.upper]).all()
         if count not in (1, 2) or not numbers or not np.less(self.lower, self.upper).all():

@@ -48,11 +48,7 @@ class Profile(Patch):
     flipped: bool = False
 
     def __post_init__(self) -> None:
-        """Reject points that do not define a curve.
-
-        Raises:
-            InvalidInputError: If they are too few, not in the plane, or consecutive ones coincide.
-        """
+        """Reject points that are too few, not in the plane, or equal to the one before."""
         known = all(len(point) == 2 for point in self.points) and np.isfinite(self.points).all()
         if len(self.points) < 3 or not known or not self._lengths.all():
             raise InvalidInputError(

@@ -18,9 +18,7 @@ from fenics_contact.shapes.simple import AboutAxis, Revolved, outer, require_pla
 class _Wedge:
     """The half of a wedge in the plane (r, z), r ≥ 0, that opens along z, offset by a radius.
 
-    Attributes:
-        slope: Sine and cosine of the half angle.
-        radius: Radius of the tip, [length].
+    `slope`: sine and cosine of the half angle.
     """
 
     slope: tuple[float, float]

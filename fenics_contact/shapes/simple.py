@@ -36,12 +36,7 @@ Quantity: TypeAlias = Literal["distance", "normals", "curvatures"]
 
 
 def evaluate_shape(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> np.ndarray:
-    """Evaluate a member of a shape, and check the result.
-
-    `shape`: the shape of a surface, or a rigid obstacle; `points`: points, shape (n, dim), [length].
-
-    Returns the result, shape (n,), (n, dim) or (n, dim, dim).
-    """
+    """Evaluate a member of a shape or rigid obstacle, and check the result."""
     name = f"the {what} of {type(shape).__name__}"
     with user_code(name):
         values = np.asarray(getattr(shape, what)(points), dtype=np.float64)
@@ -63,14 +58,10 @@ ROUNDING = 16 * float(np.finfo(float).eps)
 
 
 def closest_points(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
-    """Return the points of a surface that are closest to given ones.
+    """Return the points of a surface that are closest to given ones; any of several.
 
     x − d(x) n(x), repeated if the distance is not exact, until the points lie on the surface or do not come
     closer.
-
-    `shape`: the shape; `points`: points, shape (n, dim), [length].
-
-    Returns one point of the surface each, shape (n, dim); any of several closest ones.
     """
     closest = np.array(points, dtype=np.float64)
     before = np.inf
@@ -101,10 +92,7 @@ DIFFERENCE = 1e-5
 
 
 def differences(function: Callable[[np.ndarray], np.ndarray], points: np.ndarray) -> np.ndarray:
-    """Return central differences along each axis, stacked last.
-
-    `function`: vectorised, (n, dim) -> (n, ...); `points`: points, shape (n, dim).
-    """
+    """Return central differences along each axis, stacked last."""
     if len(points) == 0:
         return np.zeros((*np.shape(function(points)), points.shape[1]))
     far = float(np.abs(points).max()) or 1.0

@@ -12,11 +12,8 @@ from scipy.spatial import cKDTree
 class ClosestOnTriangles:
     """Where points are closest to triangles.
 
-    Attributes:
-        triangle: The triangle, shape (n,).
-        weights: Weights of its corners at the closest point, exactly zero off an edge or corner that it lies
-            on, shape (n, 3).
-        point: The closest point, shape (n, 3), [length].
+    `weights`: weights of its corners at the closest point, exactly zero off an edge or corner that it lies
+    on.
     """
 
     triangle: np.ndarray
@@ -107,8 +104,6 @@ def closest_in_triangles(points: np.ndarray, corners: np.ndarray) -> tuple[np.nd
 
     The foot in the plane if it lies inside, else the closest point of the nearest edge; weights of corners
     that do not take part are exactly zero.
-
-    `points`: shape (n, 3); `corners`: shape (n, 3, 3), [length].
     """
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     arm = points - corners[:, 0]
