@@ -77,11 +77,9 @@ def check_cell_type(cell: str, dim: int = 3) -> None:
 
 
 def structured_cells(counts: tuple[int, ...], closed: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Number the hexahedra or quadrilaterals of a lattice.
+    """Number the hexahedra or quadrilaterals of a lattice, and return their indices along its axes.
 
     Node (i, j, k) has the number ``(i * (n2 + 1) + j) * (n3 + 1) + k``; cells follow the same order.
-
-    Returns cells, (n_cells, 8 | 4), and their indices, (n_cells, 3 | 2), int64.
     """
     solid = len(counts) == 3
     n1, n2, n3 = counts if solid else (*counts, 1)
@@ -105,16 +103,12 @@ def repeated_regions(mesh: BodyMesh, pieces: int) -> dict[str, np.ndarray]:
 
 
 def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyMesh:
-    """Split every hexahedron into six tetrahedra around a space diagonal.
+    """Split every hexahedron into six tetrahedra around a space diagonal, on the same nodes.
 
     The diagonal runs from vertex 0 to vertex 6, or between their mirror images. Neighbours meet in the same
     face diagonals where their vertices are numbered alike, as in every structured mesh of this package, and
-    whole layers of cells are mirrored.
-
-    `mirrored`: (n_cells, 3) bool: whether the diagonal is mirrored in each local direction; nowhere unless
-    given.
-
-    Returns the tetrahedra on the same nodes, surfaces and regions split alike, grid index repeated.
+    whole layers of cells are mirrored. `mirrored`: (n_cells, 3) bool: whether the diagonal is mirrored in
+    each local direction; nowhere unless given.
     """
     if mesh.cell_type != "hexahedron":
         raise InvalidInputError(
@@ -254,8 +248,6 @@ def graded(n: int, grading: float) -> np.ndarray:
     """Divide [0, 1] into intervals that grow geometrically; those for 2 n halve those for n.
 
     `grading`: logarithm of the growth over the whole of [0, 1], 0 for equal intervals.
-
-    Returns ascending ticks, (n + 1,).
     """
     uniform = np.linspace(0.0, 1.0, n + 1)
     return uniform if grading == 0.0 else np.asarray(np.expm1(grading * uniform) / np.expm1(grading))
@@ -284,13 +276,7 @@ def box_lattice(ticks: Sequence[np.ndarray], cell: str = "hexahedron") -> BodyMe
 
 
 def box_sides(points: np.ndarray, cells: np.ndarray) -> dict[str, np.ndarray]:
-    """Sort the boundary faces of a box or rectangle by their direction.
-
-    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, n_vertices), of a box along the
-    axes.
-
-    Returns facets of each of the six `SIDES`, or of the first four.
-    """
+    """Sort the boundary faces of a box or rectangle along the axes by their direction, see `SIDES`."""
     dim = points.shape[1]
     facets, _ = boundary_faces(cells, dim)
     areas = vector_areas(points, facets)
@@ -301,15 +287,13 @@ def box_sides(points: np.ndarray, cells: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None = None) -> BodyMesh:
-    """Sweep a plane mesh along z.
+    """Sweep a plane mesh along z, layer by layer.
 
-    `heights`: ascending z of the layers' planes, (n_layers + 1,); `present`: whether a cell of the section is
-    there in a layer, (n_layers, n_cells) bool; everywhere unless given. With it a bolt is swept at once: its
-    head is wider than its shank.
-
-    Returns hexahedra, layer by layer. Surfaces are "bottom" and "top", which face along z wherever cells end,
-    and the section's, swept. Walls inside the section, where a cell is present and its neighbour is not, are
-    in no surface. The section's regions and the shapes of its curves are swept, too. No grid.
+    `present`: whether a cell of the section is there in a layer, (n_layers, n_cells) bool; everywhere unless
+    given. With it a bolt is swept at once: its head is wider than its shank. Surfaces are "bottom" and "top",
+    which face along z wherever cells end, and the section's, swept. Walls inside the section, where a cell is
+    present and its neighbour is not, are in no surface. The section's regions and the shapes of its curves
+    are swept, too. No grid.
     """
     if section.cell_type != "quadrilateral":
         raise InvalidInputError(
@@ -421,12 +405,10 @@ def rectangle_lattice(ticks: Sequence[np.ndarray], cell: str = "quadrilateral") 
 
 
 def split_quadrilaterals(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyMesh:
-    """Split every quadrilateral into two triangles along a diagonal.
+    """Split every quadrilateral into two triangles along a diagonal, on the same nodes.
 
     `mirrored`: (n_cells,) bool: whether the diagonal runs from vertex 1 to vertex 3 and not from vertex 0 to
     vertex 2; nowhere unless given.
-
-    Returns the triangles on the same nodes, surfaces unchanged, grid index repeated, regions split alike.
     """
     if mesh.cell_type != "quadrilateral":
         raise InvalidInputError(

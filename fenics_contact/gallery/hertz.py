@@ -26,9 +26,7 @@ CORE = 0.5
 class RoundFrame:
     """Cube coordinates (u, v, w) of a round body.
 
-    Attributes:
-        flat: Directions along which the body is straight: (1,) for a cylinder along y, () for a ball.
-        dim: Dimension, 2 for a disc.
+    `flat`: directions along which the body is straight: (1,) for a cylinder along y, () for a ball.
     """
 
     radius: float

@@ -39,11 +39,8 @@ from fenics_contact.shapes.simple import Torus
 class Spacing:
     """Cells and strengths of a ring.
 
-    Attributes:
-        quarter: Cells on a quarter turn of a crown.
-        leg: Cells on a leg, all of one length.
-        along: Strength κ on the crowns, 0 for equal cells.
-        through: Strength through its thickness, towards its inner side.
+    `quarter`: cells on a quarter turn of a crown; `leg`: cells on a leg, all of one length; `along`: strength
+    κ on the crowns, 0 for equal cells; `through`: strength through its thickness, towards its inner side.
     """
 
     quarter: int
@@ -75,9 +72,8 @@ def strength_for(smallest: float) -> float:
 class WireSection:
     """A rounded square.
 
-    Attributes:
-        thickness: Size along a (radially in the ring).
-        roundness: Turning angle of every arc over 90 degrees, above 0 and below 1.
+    `thickness`: size along a (radially in the ring); `roundness`: turning angle of every arc over 90 degrees,
+    above 0 and below 1.
     """
 
     thickness: float
@@ -135,7 +131,7 @@ class WireSection:
     def inner_arc(self, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return points (a, b) of the arc on the ring's inside, and unit normals out of the section.
 
-        `along`: places from −1 at negative b to 1, shape (n,); both results have shape (n, 2).
+        `along`: places from −1 at negative b to 1.
         """
         angle = self.half_angle * along
         normals = np.column_stack([-np.cos(angle), np.sin(angle)])
@@ -150,8 +146,6 @@ class WireSection:
 
     def points(self, through: np.ndarray, across: np.ndarray) -> np.ndarray:
         """Return points (a, b) of the section by transfinite interpolation between its four arcs, (n, 2).
-
-        `through`, `across`: places along a and b from −1 to 1, shape (n,) each.
 
         References:
             Gordon and Hall, Construction of curvilinear co-ordinate systems and applications to mesh
@@ -250,12 +244,10 @@ class LinkShape:
 
 
 def _spacing(shape: LinkShape) -> Spacing:
-    """Choose the spacing for a link's `grading`.
+    """Choose the spacing for a link's `grading`; without it a sixth of the ring for every part.
 
     Cells are moved from the legs to graded crowns such that the cells on both sides of their border are most
     similar along the centre line.
-
-    Returns the spacing; without grading a sixth of the ring for every quarter turn and leg.
     """
     n = shape.n_around // 6
     if shape.grading == 0.0:
@@ -284,11 +276,9 @@ def crown_start(shape: LinkShape) -> int:
 
 
 def stations(shape: LinkShape, around: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Place the section around the ring.
+    """Return points of the wire's centre line and the direction a of the section, around the ring.
 
-    `around`: places, in numbers of cells from node 0, shape (n,).
-
-    Returns points of the wire's centre line, (n, 3), and the unit direction a of the section there, (n, 3).
+    `around`: places, in numbers of cells from node 0.
     """
     spacing, half = shape.spacing, shape.n_around // 2
     turning, n_leg = 2 * spacing.quarter, spacing.leg
