@@ -56,7 +56,6 @@ class CompiledForm:
         """Return the form on one mesh.
 
         Integrals without a tag cover the whole mesh, those with a tag only the entities given for it.
-
         `facets`: tag of a surface integral -> (cells, local facets) from `match_facets`.
         """
         if old():

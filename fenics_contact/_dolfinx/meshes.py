@@ -24,8 +24,7 @@ def _partitioner(destinations: cpp.graph.AdjacencyList_int32) -> Callable[..., c
 def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> dolfinx.mesh.Mesh:
     """Build a mesh on this rank only.
 
-    `points`: coordinates, shape (n, dim), [length]; `cells`: rows of node numbers in VTK order, shape (m,
-    n_vertices).
+    `cells`: rows of node numbers in VTK order.
     """
     return _create_mesh(MPI.COMM_SELF, points, cells, cell_type, np.zeros((len(cells), 1), dtype=np.int32))
 
@@ -33,11 +32,7 @@ def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> dolfinx
 def rank_mesh(
     comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, rank: np.ndarray, cell_type: str
 ) -> dolfinx.mesh.Mesh:
-    """Build a distributed mesh with cells on given ranks; a rank may have none. Collective on ``comm``.
-
-    `points`: all coordinates, shape (n_nodes, dim), replicated, [length]; `rank`: owner of each cell, shape
-    (n_cells,), replicated.
-    """
+    """Build a distributed mesh with cells on given ranks; a rank may have none. Collective on ``comm``."""
     bounds = np.linspace(0, len(points), comm.size + 1).astype(int)
     mine = np.flatnonzero(rank == comm.rank)
     destinations: tuple[np.ndarray, ...] = (np.full((len(mine), 1), comm.rank, dtype=np.int32),)

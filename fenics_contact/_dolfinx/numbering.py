@@ -82,10 +82,7 @@ def lagrange_degree(space: dolfinx.fem.FunctionSpace) -> int | None:
 
 
 def cell_field(mesh: dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> dolfinx.fem.Function:
-    """Return a field on ``mesh`` that is constant on each cell, by the values on this rank's own cells.
-
-    `values`: shape (n_owned, ...): numbers, vectors or tensors.
-    """
+    """Return a field on ``mesh`` that is constant on each cell, by the values on this rank's own cells."""
     element = cellwise_element(cell_type_of_mesh(mesh), values.shape[1:])
     field = dolfinx.fem.Function(_space(mesh, element), name=name)
     dofs = cell_dofs(field.function_space).ravel()[: len(values)]
@@ -142,7 +139,7 @@ def input_cells(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
 def node_dofs(space: dolfinx.fem.FunctionSpace) -> tuple[np.ndarray, np.ndarray]:
     """Return (input nodes, blocked dofs): dof ``dofs[i]`` of ``space`` sits on input node ``nodes[i]``.
 
-    Both arrays have one entry for each node of this rank, ghosts included, in ascending node order.
+    One entry for each node of this rank, ghosts included, in ascending node order.
     """
     mesh = space.mesh
     cells = cell_count(mesh)
@@ -164,10 +161,7 @@ def update_coordinates(mesh: dolfinx.mesh.Mesh, points: np.ndarray) -> None:
 
 
 def match_facets(mesh: dolfinx.mesh.Mesh, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the facets of ``mesh`` whose nodes form a row of ``surface``.
-
-    `mesh`: A mesh on one rank; `surface`: corners of facets as input nodes, shape (n_facets, n_corners), any
-    order.
+    """Find the facets of ``mesh``, on one rank, whose nodes form a row of ``surface``, in any order.
 
     Returns cells and local facet numbers of those on this mesh, one entry each.
     """

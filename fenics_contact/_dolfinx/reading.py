@@ -20,15 +20,11 @@ __all__ = ["MeshArrays", "TagArrays", "mesh_arrays", "read_mesh", "read_tags", "
 class MeshArrays:
     """A mesh, the same on all ranks of its communicator but for what is on this rank.
 
-    Attributes:
-        cell_type: Type of the cells; dolfinx's name if bodies cannot have them.
-        points: Coordinates, (n_nodes, geometric dimension), in the order of dolfinx's input.
-        inputs: dolfinx's number of each of them in its input, ascending, (n_nodes,).
-        cells: Node numbers, (n_cells, nodes of a cell), in the order of dolfinx's input; nodes of cells that
-            bodies can have in VTK order.
-        order: Degree of the map from the reference cell.
-        node: Number of every node of this rank's geometry among ``points``.
-        cell: Number of every cell that this rank owns among ``cells``.
+    `cell_type`: type of the cells; dolfinx's name if bodies cannot have them; `points`: coordinates, in the
+    order of dolfinx's input; `inputs`: dolfinx's number of each of them in its input, ascending; `cells`:
+    node numbers, in the order of dolfinx's input; nodes of cells that bodies can have in VTK order; `node`:
+    number of every node of this rank's geometry among ``points``; `cell`: number of every cell that this rank
+    owns among ``cells``.
     """
 
     cell_type: str
@@ -45,9 +41,7 @@ class MeshArrays:
 class TagArrays:
     """Tags on cells or facets of one mesh.
 
-    Attributes:
-        entities: Cell numbers, (n,), or node numbers of facets in any order, (n, nodes of a facet).
-        values: Their tags, (n,).
+    `entities`: cell numbers, or node numbers of facets in any order.
     """
 
     entities: np.ndarray
@@ -57,14 +51,8 @@ class TagArrays:
 def read_mesh(path: Path, name: str, inline: bool) -> dolfinx.mesh.Mesh:
     """Read a grid of an XDMF file on this rank only.
 
-    Args:
-        path: The file.
-        name: Name of the grid.
-        inline: Whether the data are in the file itself and not in an HDF5 file beside it.
-
-    Raises:
-        InvalidInputError: If a node belongs to no cell, in which case dolfinx 0.5 would end the whole
-            process.
+    `inline`: whether the data are in the file itself and not in an HDF5 file beside it. A node that belongs
+    to no cell is refused: dolfinx 0.5 would end the whole process.
     """
     with _opened(path, inline) as file:
         n_nodes = len(file.read_geometry_data(name, "/Xdmf/Domain"))

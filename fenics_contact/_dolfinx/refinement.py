@@ -14,11 +14,9 @@ def halved_simplices(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return a mesh in which all edges of the marked cells are halved, and as many others as that takes.
 
-    Every cell with a halved edge has its longest one halved, too, so that angles stay bounded (A. Plaza,
-    G.F. Carey, Applied Numerical Mathematics 32, 2000). New nodes are midpoints of edges.
-
-    `points`: coordinates, shape (n, dim), [length]; `cells`: linear simplices, shape (m, dim + 1); `marked`:
-    numbers of cells. Returns coordinates and cells, both in an order of dolfinx's own.
+    Every cell with a halved edge has its longest one halved, too, so that angles stay bounded (A. Plaza, G.F.
+    Carey, Applied Numerical Mathematics 32, 2000). New nodes are midpoints of edges. Coordinates and cells
+    are in an order of dolfinx's own.
     """
     dim = points.shape[1]
     mesh = local_mesh(points, cells, cell_type)
