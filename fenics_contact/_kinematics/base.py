@@ -15,11 +15,7 @@ from fenics_contact.mesh.quality import cell_volumes, jacobians
 
 
 class Gradients:
-    """Displacement gradients at the Gauss points of cells, and what is dual to them.
-
-    Attributes:
-        slopes: Gradients of the shape functions, shape (n_cells, n_gauss, nodes, dim), [1 / length].
-    """
+    """Displacement gradients at the Gauss points of cells, and what is dual to them."""
 
     def __init__(self, slopes: np.ndarray) -> None:
         """Keep the gradients of the shape functions."""
@@ -35,38 +31,25 @@ class Gradients:
         return self.slopes
 
     def of(self, nodal: np.ndarray) -> np.ndarray:
-        """Return ∂u_i/∂X_j in three dimensions, zero out of the plane, shape (n_cells, n_gauss, 3, 3).
-
-        `nodal`: displacements, shape (n_cells, nodes, dim), [length].
-        """
+        """Return ∂u_i/∂X_j of nodal u, zero out of the plane, shape (n_cells, n_gauss, 3, 3)."""
         dim = self.slopes.shape[-1]
         gradient = np.zeros((*self.slopes.shape[:2], 3, 3))
         gradient[..., :dim, :dim] = nodal.swapaxes(1, 2)[:, None] @ self.slopes
         return gradient
 
     def contracted(self, tensors: np.ndarray) -> np.ndarray:
-        """Return T : ∇v for each unit nodal v, shape (n_cells, n_gauss, nodes, dim).
-
-        `tensors`: T, shape (n_cells, n_gauss, 3, 3).
-        """
+        """Return T : ∇v for each unit nodal v, shape (n_cells, n_gauss, nodes, dim)."""
         dim = self.slopes.shape[-1]
         return np.asarray(self.slopes @ tensors[..., :dim, :dim].swapaxes(2, 3))
 
     def force(self, weights: np.ndarray, stress: np.ndarray) -> np.ndarray:
-        """Return ∫ P : ∇v, shape (n_cells, nodes, dim), [force].
-
-        `weights`: of the points, shape (n_cells, n_gauss); `stress`: P, shape (n_cells, n_gauss, 3, 3).
-        """
+        """Return ∫ P : ∇v, shape (n_cells, nodes, dim), [force]; `weights`: of the Gauss points."""
         dim = self.slopes.shape[-1]
         weighted = weights[..., None, None] * stress[..., :dim, :dim]
         return np.asarray((self.slopes @ weighted.swapaxes(2, 3)).sum(axis=1))
 
     def blocks(self, weights: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-        """Return ∫ ∇v : A : ∇u, shape (n_cells, nodes, dim, nodes, dim).
-
-        `weights`: of the points, shape (n_cells, n_gauss); `tangent`: A, shape (n_cells, n_gauss, 3, 3, 3,
-        3), [force / length²].
-        """
+        """Return ∫ ∇v : A : ∇u, shape (n_cells, nodes, dim, nodes, dim); `weights`: of the Gauss points."""
         G = self.slopes
         n, m, _, dim = G.shape
         A = weights[..., None, None, None, None] * tangent[..., :dim, :dim, :dim, :dim]
@@ -87,9 +70,6 @@ class Kinematics:
     """The kinematics of solid bodies, and of plane bodies.
 
     Others are subclasses, and all that depends on the kinematics of a body is a method or an attribute here.
-
-    Attributes:
-        dim: Number of coordinates, 2 or 3.
     """
 
     dim: int
@@ -200,9 +180,7 @@ class Kinematics:
 
         A material is defined for displacements only. Its energy is written for c·x − d with constants c and
         d, whose gradient is c; then c is replaced by the gradient g, and d by g·x, so that the displacement
-        is zero: materials may resist displacements, too.
-
-        `constant`: returns a constant (UFL) of a shape.
+        is zero: materials may resist displacements, too. `constant`: returns a constant (UFL) of a shape.
         """
         import ufl
         from ufl.algorithms import expand_derivatives
@@ -218,8 +196,8 @@ class Kinematics:
     def gradients(self, slopes: np.ndarray, values: np.ndarray, first: np.ndarray) -> Gradients:
         """Return displacement gradients at Gauss points.
 
-        `slopes`: gradients of the shape functions, (n_cells, n_gauss, nodes, dim), [1 / length]; `values`: of
-        the shape functions, (n_gauss, nodes); `first`: first coordinates of the points, (n_cells, n_gauss).
+        `slopes` and `values`: gradients and values of the shape functions; `first`: first coordinates of the
+        points.
         """
         return Gradients(slopes)
 
@@ -232,10 +210,7 @@ class Kinematics:
         return 1.0
 
     def volumes(self, points: np.ndarray, cells: np.ndarray, positions: np.ndarray) -> np.ndarray:
-        """Return volumes per volume of the reference cell, (n_cells, m), of affine cells (n_cells, 1).
-
-        `positions`: reference coordinates, (m, dim).
-        """
+        """Return volumes per volume of the reference cell, (n_cells, m), of affine cells (n_cells, 1)."""
         return jacobians(points, cells, positions)
 
     def volume(self, mesh: BodyMesh, cells: np.ndarray) -> float:
@@ -271,7 +246,7 @@ class Kinematics:
     def whole_force(self, force: float, point: np.ndarray, planes: int) -> tuple[float, float | None]:
         """Return the force of a contact beyond planes of symmetry, and its radius around an axis.
 
-        `point`: in its middle, (dim,); `planes`: number of planes of symmetry through it.
+        `planes`: number of planes of symmetry through it.
         """
         return force * 2.0**planes, None  # each plane halves the force
 
@@ -296,7 +271,7 @@ class Kinematics:
         """Return stresses of these strains of size one, means over cells, (n_cells, 6) each.
 
         `rest`: without displacement; `further`: of `further_fields`; `gauss_points`: weights in coordinates,
-        (n_cells, n_gauss), and places, (n_cells, n_gauss, dim).
+        and places.
         """
         return further
 

@@ -17,8 +17,7 @@ from fenics_contact.mesh.cell_types import CELL_TYPES, CellType
 class Element:
     """What forms are written for.
 
-    Attributes:
-        cells: Type of the cells of the mesh.
+    `cells`: type of the cells of the mesh.
     """
 
     cells: str

@@ -47,10 +47,8 @@ class Stabilised(Reduced):
     """Reduced integration with a small share of full integration.
 
     At sections of bodies that are one cell across, reduced integration leaves motions without energy, which
-    no other cells resist: they get some by a share of full integration.
-
-    Attributes:
-        share: Of full integration; stresses change by about as much.
+    no other cells resist: they get some by a share of full integration. `share`: of full integration;
+    stresses change by about as much.
     """
 
     share: float = 1e-6

@@ -22,15 +22,14 @@ class Measure:
     def around_closed(self, first: np.ndarray, closed: np.ndarray, share: np.ndarray) -> np.ndarray | float:
         """Return `around` in the middle of the closed share of facets, (n,).
 
-        `first`, `closed`: first coordinates and marks of their corners, (n, corners).
+        `first`, `closed`: first coordinates and marks of their corners.
         """
         return 1.0
 
     def weights(self, weight: np.ndarray, functions: np.ndarray, first: np.ndarray) -> np.ndarray:
-        """Return weights of the points of cells on facets, shape (n, q), as weights of a quadrature.
+        """Return weights of the points of cells on facets, as weights of a quadrature.
 
-        `functions`: functions of the nodes of facets, (n, q, nodes); `first`: their first coordinates, (n,
-        nodes).
+        `functions`: functions of the nodes of facets, (n, q, nodes); `first`: their first coordinates.
         """
         return weight
 
@@ -55,8 +54,7 @@ class Measure:
     def filled(self, facets: np.ndarray, values: np.ndarray, on_axis: np.ndarray) -> np.ndarray:
         """Return values at nodes with those at ends to which no area belongs filled in.
 
-        `facets`: node numbers, (n, nodes of a facet); `values`: at nodes, (n_nodes,) or (n_nodes, k);
-        `on_axis`: marks of nodes, (n_nodes,).
+        `on_axis`: marks of nodes.
         """
         return values
 

@@ -20,12 +20,7 @@ _IN_SPACE = "tetrahedron"
 
 
 class LiftedCoefficient(ufl.Coefficient):
-    """A displacement in space of which value and gradient are known as expressions.
-
-    Attributes:
-        value: Vector of three components.
-        gradient: Tensor, 3 x 3.
-    """
+    """A displacement in space of which value and gradient are known as expressions."""
 
     value: Expr
     gradient: Expr
