@@ -357,12 +357,7 @@ PAIRS = {3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)), 2: ((0, 0), (1, 1)
 
 
 def to_vector(tensor: np.ndarray) -> np.ndarray:
-    """Return the entries of symmetric tensors in Voigt order, without factors.
-
-    `tensor`: shape (..., 3, 3).
-
-    The result has shape (..., 6).
-    """
+    """Return the entries of symmetric tensors, (..., 3, 3), in Voigt order, without factors."""
     rows, columns = np.transpose(PAIRS[3])
     return np.asarray(tensor[..., rows, columns])
 
@@ -396,11 +391,7 @@ def symmetric_product(entries: tuple[ufl.Constant, ...], vector: list[Expr]) -> 
 
 
 def rotated_stiffness(C: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """Rotate a stiffness matrix from material axes to those of the scene.
-
-    `C`: stiffness in material axes, Voigt, shape (6, 6) or (3, 3); `axes`: material axes as rows,
-    orthonormal, shape (dim, dim).
-    """
+    """Rotate a stiffness matrix (Voigt) from material axes, given as rows, to those of the scene."""
     T = strain_rotation(axes)
     return np.asarray(T.T @ C @ T)
 
@@ -423,8 +414,7 @@ def thermal_stresses(
 ) -> tuple[float, ...]:
     """Return C : α in Voigt order, nothing without an expansion.
 
-    `axes`: material axes as rows, shape (dim, dim); `expansion`: along them, or all components of a tensor in
-    Voigt order.
+    `axes`: material axes as rows; `expansion`: along them, or all components of a tensor in Voigt order.
     """
     if expansion is None:
         return ()

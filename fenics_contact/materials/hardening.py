@@ -17,9 +17,7 @@ Points = tuple[tuple[float, float], ...]
 class Curve:
     """A stress by plastic strain: straight between points, with a slope beyond the last one.
 
-    Attributes:
-        points: Plastic strains, which ascend from zero, and stresses, [force / length²].
-        beyond: [force / length²].
+    `points`: plastic strains, which ascend from zero, and stresses.
     """
 
     points: Points
@@ -47,9 +45,7 @@ NO_BACK_STRESS = Curve(((0.0, 0.0),))
 class Hardening:
     """Yield stress by equivalent plastic strain α, that of a curve and (σ_∞ − σ_0)(1 − exp(−δ α)).
 
-    Attributes:
-        gain: σ_∞ − σ_0, [force / length²].
-        rate: δ.
+    `gain`: σ_∞ − σ_0; `rate`: δ.
     """
 
     curve: Curve
@@ -118,12 +114,8 @@ def check_plastic(young_modulus: float, hardening: Hardening, kinematic: Curve) 
 class Returned:
     """Where the return mapping ends.
 
-    Attributes:
-        stress: Shape (n, 3, 3), [force / length²].
-        moduli: Consistent tangent ∂σ/∂ε, shape (n, 3, 3, 3, 3).
-        flow: Increment of plastic strain, shape (n, 3, 3); zero where the step is elastic.
-        alpha: Equivalent plastic strain at the end of the step, shape (n,).
-        back: Increment of the back stress, shape (n, 3, 3), [force / length²].
+    `moduli`: consistent tangent ∂σ/∂ε; `flow`: increment of plastic strain; zero where the step is elastic;
+    `alpha`: equivalent plastic strain at the end of the step; `back`: increment of the back stress.
     """
 
     stress: np.ndarray
@@ -144,11 +136,9 @@ def radial_return(
     """Map an elastic trial state back to the yield surface.
 
     Backward Euler for von Mises' yield function with associated flow, isotropic and kinematic hardening; the
-    normal of the trial state is that of the final one.
-
-    `strain`: trial elastic strain, shape (n, 3, 3); `back`: back stress at the start of the step, deviatoric,
-    shape (n, 3, 3); `alpha`: equivalent plastic strain there, shape (n,); `kinematic`: back stress in tension
-    by equivalent plastic strain.
+    normal of the trial state is that of the final one. `back`: back stress at the start of the step,
+    deviatoric; `alpha`: equivalent plastic strain there; `kinematic`: back stress in tension by equivalent
+    plastic strain.
 
     References:
         J. C. Simo, T. J. R. Hughes: Computational Inelasticity. Springer 1998, Boxes 3.1 and 3.2.
@@ -187,12 +177,9 @@ ROOT = float(np.sqrt(2.0 / 3.0))
 class Flowing:
     """How far points flow.
 
-    Attributes:
-        multiplier: Δγ, shape (n,); zero where the step is elastic.
-        strength: s σ_y at the end of the step, shape (n,), [force / length²].
-        slope: Slope by α of what holds them at the yield surface, s σ_y + b (β − β_n), zero where the step is
-            elastic, shape (n,), [force / length²].
-        back: β(α) − β(α_n), shape (n,), [force / length²].
+    `multiplier`: Δγ; zero where the step is elastic; `strength`: s σ_y at the end of the step; `slope`: slope
+    by α of what holds them at the yield surface, s σ_y + b (β − β_n), zero where the step is elastic; `back`:
+    β(α) − β(α_n).
     """
 
     multiplier: np.ndarray
@@ -214,8 +201,6 @@ def multipliers(
 
     Newton's method, with bisection where it leaves the bracket: curves have kinks, and softening ends with
     one at σ_y = 0.
-
-    `length`: ‖ξ‖ of the trial state; `alpha`: α_n; `stiffness`: k; `scale` and `back_scale`: s and b.
     """
     s, b = (np.broadcast_to(np.asarray(each, dtype=np.float64), length.shape) for each in (scale, back_scale))
     multiplier, slope, back = np.zeros_like(length), np.zeros_like(length), np.zeros_like(length)

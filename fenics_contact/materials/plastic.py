@@ -104,11 +104,7 @@ class HistoryMaterial(Elasticity):
     thermal_expansion: float | None = None
 
     def __init_subclass__(cls, **given: Any) -> None:
-        """Reject a model that replaces the checks of what it returns.
-
-        Raises:
-            InvalidInputError: If it has an `answer` of its own.
-        """
+        """Reject a model that replaces `answer`, the checks of what it returns."""
         super().__init_subclass__(**given)
         if "answer" in vars(cls):
             raise InvalidInputError(
