@@ -93,11 +93,7 @@ def program(
 
 
 def main(comm: MPI.Comm, arguments: Sequence[str] | None = None) -> int:
-    """Run the command given by the arguments; return the exit code, the same on every rank.
-
-    `comm`: all ranks of the program; `arguments`: the command line, without the program's name; that of the
-    process unless given.
-    """
+    """Run the command given by the arguments; return the exit code, the same on every rank."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # characters that it cannot encode are written as escapes
             stream.reconfigure(errors="backslashreplace")

@@ -79,11 +79,7 @@ EPILOG = "\b\nExit codes:\n" + "\n".join(f"{code.value:<4d} {words}" for code, w
 
 @dataclass(frozen=True)
 class Console:
-    """The ranks of a command; output is written by rank 0.
-
-    Attributes:
-        comm: All ranks of the program.
-    """
+    """The ranks of a command; output is written by rank 0."""
 
     comm: MPI.Comm
 

@@ -97,12 +97,9 @@ def _check(file: SceneFile) -> None:
 class _Done:
     """An optimisation that ended.
 
-    Attributes:
-        problem: That of the result, on the last mesh.
-        gridded: On a mesh whose designed surfaces have grids of nodes, in space the first.
-        before: The first design, on the same mesh.
-        products: Products with F on all meshes.
-        accurate: What `minimize_to` found; None on one mesh.
+    `problem`: that of the result, on the last mesh; `gridded`: on a mesh whose designed surfaces have grids
+    of nodes, in space the first; `before`: the first design, on the same mesh; `products`: products with F on
+    all meshes.
     """
 
     result: Result

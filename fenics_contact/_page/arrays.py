@@ -19,10 +19,7 @@ class Arrays:
         self._size = 0
 
     def add(self, values: np.ndarray, *, exact: bool = False) -> int:
-        """Return the number of an array, added unless it is there.
-
-        `values`: numbers of any shape, (n, ...); integers are kept as such.
-        """
+        """Return the number of an array, added unless it is there; integers are kept as such."""
         whole = np.issubdtype(values.dtype, np.integer) and values.min(initial=0) >= 0
         kept = np.ascontiguousarray(values, dtype="<u4" if whole else "<f4")
         if not whole and not exact:

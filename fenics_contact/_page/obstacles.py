@@ -29,7 +29,7 @@ def obstacle_entries(
 ) -> list[dict[str, Any]]:
     """Return type and lines of each different rigid obstacle; no lines if it is of another shape.
 
-    `points`: all nodes of the bodies, (n, 3); `turned`: whether sections were turned around their axis.
+    `turned`: whether sections were turned around their axis.
     """
     scene = record.get("scene") or {}
     dim = 3 if turned else int(scene.get("dimension") or 3)
@@ -53,10 +53,7 @@ def obstacle_entries(
 def _obstacle_lines(
     entry: Mapping[str, Any], points: np.ndarray, tools: Mapping[str, Any], turned: bool
 ) -> list[np.ndarray]:
-    """Return the lines of an obstacle where it is.
-
-    `tools`: motions of rigid tools by name.
-    """
+    """Return the lines of an obstacle where it is."""
     shape = _shape(entry.get("obstacle") or entry.get("shape") or entry)
     if shape is None:
         return []

@@ -378,8 +378,7 @@ def _origin(record: Record) -> dict[str, Any]:
 class Source:
     """The content of a page.
 
-    Attributes:
-        comm: Ranks that know it, None if only the calling one does.
+    `comm`: ranks that know it, None if only the calling one does.
     """
 
     steps: list[tuple[str, Mapping[str, pyvista.UnstructuredGrid]]]

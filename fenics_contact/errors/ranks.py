@@ -131,8 +131,7 @@ def _freed(comm: MPI.Comm, key: int, own: MPI.Comm) -> None:
 class Post:
     """One exchange under way.
 
-    Attributes:
-        places: Where all ranks are, once `ended` is true.
+    `places`: where all ranks are, once `ended` is true.
     """
 
     def __init__(self, own: MPI.Comm, place: int) -> None:
@@ -155,8 +154,8 @@ def exchanged(
 ) -> tuple[list[int], BaseException | None]:
     """Return where all ranks are, and this rank's error, possibly an interrupt received while waiting.
 
-    `error`: this rank's error, or None; `where`: name of this rank's call; `wait`: seconds after which a rank
-    with an error ends the program; None for never.
+    `where`: name of this rank's call; `wait`: seconds after which a rank with an error ends the program; None
+    for never.
     """
     post = Post(own, place_of(where) if error is None else FAILED)
     begun, warned = time.monotonic(), not where
