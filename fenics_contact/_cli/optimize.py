@@ -53,7 +53,7 @@ def write_design_files(
 ) -> list[Path]:
     """Write the files of a design that the scene file asks for, and return them. Collective.
 
-    `problem`: one whose surfaces have grids of nodes; `fine`: on the mesh whose triangles are written.
+    Surfaces of `problem` have grids of nodes; `fine` is on the mesh whose triangles are written.
     """
     kinds, length, folder = file.document.output.design, file.document.units.length, file.folder
     bodies = sorted({design.body for design in problem.designs})

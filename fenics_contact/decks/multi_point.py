@@ -58,10 +58,7 @@ def read_equations(cards: Sequence[Card], mesh: DeckMesh) -> list[Equation]:
 
 @dataclass(frozen=True, eq=False)
 class Mean:
-    """A node that moves as the weighted mean of others, and whose forces these share.
-
-    `weights`: of the others, with the sum one.
-    """
+    """A node that moves as the weighted mean of others, weights of sum one; these share its forces."""
 
     card: Card
     node: int

@@ -19,10 +19,7 @@ from fenics_contact.readers.deck_cards import Card
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Contact pairs and ties, each with the surfaces of the deck that it is of.
-
-    `contacts`: the contact pairs; those that some step leaves out are the last ones.
-    """
+    """Contact pairs, last those that some step leaves out, and ties, with their surfaces of the deck."""
 
     contacts: Sequence[tuple[Sides, ContactPair]]
     ties: Sequence[tuple[Sides, AnyTie]]

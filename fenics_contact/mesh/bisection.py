@@ -96,10 +96,7 @@ def _bisected(
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """A cut of a piece normal to one direction.
-
-    `cost`: area, increased if the cut is uneven.
-    """
+    """A cut of a piece normal to one direction; its cost is the area, more if the cut is uneven."""
 
     order: np.ndarray
     cells: int

@@ -33,7 +33,6 @@ def equal_boxes(
 
         c · exp(size · |ln(n / target)| + uneven · m),   c = surfaces of all / (2d n^(1/d) volume^(1 − 1/d))
 
-
     is least: compact ones (cubes have c = 1, boxes of 2 : 2 : 1 have 1.06), of a size that is suitable, and
     equal; m counts the directions in which they differ by a layer of cells. `members`: how many boxes there
     must be for each shape; `near`: factor by which the number of boxes may miss the target; `slender`:

@@ -89,9 +89,9 @@ class Parts:
 
 
 def _entities(kind: CellType, cells: np.ndarray) -> np.ndarray:
-    """Return the corners of edges and faces of cells, each end of edges twice in space.
+    """Return the corners of edges and faces of cells in the order of a quadratic cell's nodes there.
 
-    In the order of the nodes that a quadratic cell has there.
+    Each end of edges is there twice in space.
     """
     corners = [np.flatnonzero(values > 0.1) for values in _corner_weights(kind)[:-1]]
     width = 2 ** (kind.dim - 1)
@@ -129,8 +129,7 @@ def _balanced(mesh: BodyMesh, kind: CellType, levels: np.ndarray, chosen: np.nda
 def _new_nodes(mesh: BodyMesh, kind: CellType, large: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number the nodes in the middle of edges, faces and cells, those that were there by their old numbers.
 
-    Returns the corners between which new nodes lie, in the order of their numbers, and the numbers in each
-    cell.
+    Returns also the corners between which new nodes lie, in the order of their numbers.
     """
     there = _entities(kind, mesh.cells[large])
     flat = there.reshape(-1, there.shape[2])

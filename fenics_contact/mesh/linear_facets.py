@@ -15,10 +15,10 @@ HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 
 @dataclass(frozen=True, eq=False)
 class LinearFacets:
-    """Linear facets, facet by facet.
+    """Linear facets, and the facet that each is a piece of, ascending.
 
-    `owner`: facet that each is a piece of, ascending; `number`: which of its pieces it is; of quadrilaterals
-    among triangles each linear one has two in turn, see `HALVES`.
+    `number`: which of its pieces it is; of quadrilaterals among triangles each linear one has two in turn,
+    see `HALVES`.
     """
 
     rows: np.ndarray

@@ -25,19 +25,9 @@ def near_surfaces(
     """Name the facets of bodies that face another body within a distance.
 
     Facets are treated as plane: two of them are near if they overlap, within the distance and 60 degrees of
-    parallel. Inspect the result before using it.
-
-    Example:
-        >>> meshes, pairs = near_surfaces(read_mesh("press.inp"), 0.5)  # doctest: +SKIP
-        >>> contacts = [
-        ...     ContactPair(Surface(a, f"near {b}"), Surface(b, f"near {a}"), Coulomb(0.2)) for a, b in pairs
-        ... ]  # doctest: +SKIP
-
-    `distance`: largest distance across the gap, [length]; `along`: how far beyond these facets the surfaces
-    reach, for bodies that slide, [length].
-
-    Returns the bodies with a surface "near B" on A and "near A" on B for every pair, and the pairs of names,
-    each in the order of the bodies.
+    parallel. `distance`: largest one across the gap; `along`: how far beyond these facets the surfaces reach,
+    for bodies that slide. Returns the bodies with a surface "near B" on A and "near A" on B for every pair,
+    and the pairs of names, each in the order of the bodies.
     """
     if not 0.0 < distance < np.inf:
         raise InvalidInputError(f"distance must be positive and finite, got {distance}: give the largest gap")

@@ -45,10 +45,7 @@ def moved_surfaces(problem: ShapeProblem | JointProblem, alpha: np.ndarray) -> t
 def moved_body(
     problem: ShapeProblem | JointProblem, alpha: np.ndarray, body: str | None
 ) -> tuple[str, BodyMesh]:
-    """Return name and mesh of a designed body in the shape of a design. Collective.
-
-    `body`: may be None if designs move only one.
-    """
+    """Return name and mesh of a designed body, None for the only one, in a design's shape. Collective."""
     designed = sorted({design.body for design in problem.designs})
     if body not in designed and (body is not None or len(designed) > 1):
         raise InvalidInputError(

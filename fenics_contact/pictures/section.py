@@ -387,10 +387,7 @@ class Spot:
 
 @dataclass(frozen=True)
 class Section:
-    """A plane through bodies.
-
-    `inside`: side to which it is shifted slightly.
-    """
+    """A plane through bodies, and the side to which it is shifted slightly."""
 
     view: View
     origin: np.ndarray

@@ -26,10 +26,7 @@ _NAMES = {
 
 @dataclass(frozen=True, eq=False)
 class _Instance:
-    """A part in its place: shifted, then turned about a point of the axis.
-
-    `own`: cards between *INSTANCE and *END INSTANCE.
-    """
+    """A part in its place, shifted, then turned; `own`: cards up to *END INSTANCE."""
 
     card: Card
     name: str

@@ -86,11 +86,7 @@ _SERENDIPITY_OR_LAGRANGE = {
 
 @dataclass(frozen=True)
 class Block:
-    """The role of a block of a meshio mesh.
-
-    `kind`: type of cells, None for a block that holds no cells of the bodies; `start`: number of its first
-    cell among those of its type; `size`: number of its cells of any kind.
-    """
+    """The role of a block of a meshio mesh; its cells of bodies have a kind, and numbers from `start`."""
 
     kind: str | None
     start: int

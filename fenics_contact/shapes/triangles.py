@@ -10,11 +10,7 @@ from scipy.spatial import cKDTree
 
 @dataclass(frozen=True, eq=False)
 class ClosestOnTriangles:
-    """Where points are closest to triangles.
-
-    `weights`: weights of its corners at the closest point, exactly zero off an edge or corner that it lies
-    on.
-    """
+    """Where points are closest to triangles; weights are exactly zero off an edge or corner."""
 
     triangle: np.ndarray
     weights: np.ndarray

@@ -43,10 +43,7 @@ LOOKS = {
 
 @dataclass(frozen=True)
 class Series:
-    """Some runs of a study.
-
-    `symbol`: its symbol, so that colours are not needed.
-    """
+    """Some runs of a study, with a symbol so that colours are not needed."""
 
     name: str
     runs: tuple[Run, ...]

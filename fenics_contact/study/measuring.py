@@ -115,10 +115,7 @@ class TrueErrors:
 
 
 def true_errors(states: tuple[State, ...]) -> TrueErrors | None:
-    """Solve the last step again, as exactly as possible, and compare. Collective.
-
-    None where no such solution could be computed.
-    """
+    """Solve the last step again, as exactly as possible, and compare; None where it fails. Collective."""
     state = states[-1]
     if not isinstance(state, LinearState) or not isinstance(state.solution, DualSolution):
         return None

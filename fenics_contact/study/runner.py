@@ -120,10 +120,7 @@ def fingerprint(files: Iterable[Path]) -> str:
 
 @dataclass(frozen=True)
 class Store:
-    """Finished measurements on disk, one file each.
-
-    `mark`: mark of the measured code, see `fingerprint`.
-    """
+    """Finished measurements on disk, one file each, with the mark of the code, see `fingerprint`."""
 
     folder: Path
     mark: str
@@ -305,10 +302,7 @@ def run_study(
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """A study that can be measured.
-
-    `base`: settings around which one at a time is varied.
-    """
+    """A study that can be measured; one setting at a time is varied around `base`."""
 
     study: StudyScene
     base: Parameters

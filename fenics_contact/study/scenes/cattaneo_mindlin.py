@@ -85,10 +85,7 @@ def build(parameters: Parameters, comm: MPI.Comm | None = None) -> Problem:
 
 @dataclass(frozen=True)
 class Theory:
-    """Theoretical values for the measured forces P and Q of a state.
-
-    `half_width`: a; `stick`: c; `peak`: p0.
-    """
+    """Theoretical a, c (stick) and p0 (peak) for the measured forces P and Q of a state."""
 
     half_width: float
     stick: float
