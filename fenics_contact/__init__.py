@@ -153,7 +153,7 @@ if TYPE_CHECKING:
 if not requirements.for_the_program():  # which reports what is missing as its other errors
     requirements.check()  # that they exist; nothing is loaded or started before it is used
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 #: Public modules.
 _ROOMS = (
