@@ -30,7 +30,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-core test-slow test-hard test-claims mutants random-scenes spoilt-files docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-adaptive study-large study-peers lint setup setup-demo
+.PHONY: help demo demos notebooks test coverage test-core test-slow test-hard test-claims mutants random-scenes spoilt-files docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-adaptive study-large study-peers lint setup setup-demo
 
 help: ## Show this list
 	@echo "Targets:"
@@ -90,6 +90,13 @@ test-core: $(prepare) ## Run the most telling tests: patches, Coulomb, derivativ
 
 test-slow: $(prepare) ## Run the tests that take long
 	$(launch) 1 $(python) -m pytest -m slow
+
+coverage: $(prepare) ## Count the lines and branches that the quick tests reach; output/coverage/index.html
+	@mkdir -p output
+	$(launch) 1 $(python) -m coverage run -m pytest -n $(JOBS) --dist loadfile -m "not slow and not hard and not claim" $(tested)
+	$(python) -m coverage combine -q
+	$(python) -m coverage html -q
+	$(python) -m coverage report --format=total
 
 test-hard: $(prepare) ## Run the hard cases; writes docs/hard_cases.md
 	$(launch) 1 $(python) -m pytest tests/hard -m hard --hard-table docs/hard_cases.md
