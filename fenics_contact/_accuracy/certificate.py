@@ -202,9 +202,7 @@ def admissible(
     trial = multiplier - step * residual
     wanted = trial[layout.tangential]
     length = np.linalg.norm(wanted, axis=1)
-    softened = np.ones_like(length)
-    if problem.compliance is not None:
-        softened = problem.compliance.rows_at(trial, step).slip_stiffening
+    softened = problem.compliance.rows_at(trial, step).slip_stiffening
     slip = (slip_bound > 0.0) & (length >= softened * slip_bound)
     start = np.array(multiplier)
     start[layout.normal[trial[layout.normal] <= 0.0]] = 0.0
@@ -451,7 +449,7 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
         product = system.apply(change)
         moved = float(np.sqrt(max(problem.dot(change, product), 0.0)))
         residual = residual + product
-    residual = residual + problem.given_way(known.multiplier)
+    residual = residual + problem.compliance.given_way(known.multiplier)
     if moves:
         residual = known.statuses.settled(residual)
     lifted = lift(system, known, residual, _cancelled(problem, solution))

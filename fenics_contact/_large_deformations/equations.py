@@ -414,8 +414,7 @@ class Equations:
         open_ = contact.constraint_residual(at.displacement)
         open_ = torn.compliance.added(open_, at.multiplier)
         step, feasible = at.natural_step(caution), torn.law.feasible(at.multiplier)
-        trial, compliance = at.multiplier - step * open_, torn.compliance.contact
-        mapped = feasible.project(trial) if compliance is None else compliance.resolve(feasible, trial, step)
+        mapped = torn.compliance.contact.resolve(feasible, at.multiplier - step * open_, step)
         natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
         forces = self._with_free(torn, unbalanced, at.multiplier), internal, bound, external
         residuals = relative_residuals(

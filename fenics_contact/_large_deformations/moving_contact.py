@@ -379,7 +379,7 @@ class ContactConfiguration:
         normal, friction = self.at_points(multiplier)
         points, slave, normal = self.points, self.points.points.slave, np.maximum(normal, 0.0)
         stiffness, torn = points.stiffness(normal), self.torn
-        apart = torn.compliance.contact is not None
+        apart = torn.compliance.contact.gives_way
         means = points.mean_tangents(normal, friction, self.start, apart=apart)
         further += [
             UnsymmetricLowRank(each.left, each.right, slave[each.point])

@@ -304,8 +304,7 @@ class _StiffFace:
         y = coupled.balanced(self._filled(on_face), load)
         change = fixed + moving @ y - self.at.multiplier
         gradient = coupled.operate(y, apply_unless_zero(problem, operator, change) - problem.rhs)
-        if coupled.system.face.soft is not None:
-            gradient += self._filled(coupled.system.face.offset[self.shared])
+        gradient += self._filled(coupled.system.face.offset[self.shared])
 
         def expand(vector: Vector) -> tuple[Vector, Kept]:
             step, motions = self._direction(vector)

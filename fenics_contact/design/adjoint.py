@@ -405,14 +405,14 @@ def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Pa
     after this step, owned, zero in all other rows.
     """
     columns, compliance = state.torn.free.columns, state.torn.compliance.contact
-    if compliance is not None:  # the origin is without the elastic slip of this step
-        by_force = own.by_multiplier - compliance.sprung(by_position)
-        by_area = own.by_area - slips_by_area(state.torn, state.solution.multiplier, by_position)
-        own = replace(own, by_multiplier=by_force, by_area=by_area)
+    # The origin is without the elastic slip of this step.
+    by_area = own.by_area - slips_by_area(state.torn, state.solution.multiplier, by_position)
     moved = -np.asarray(state.torn.decomposition.comm.allreduce(columns.T @ by_position))
     return replace(
         own,
         by_displacement=own.by_displacement + state.torn.force(by_position),
+        by_multiplier=own.by_multiplier - compliance.sprung(by_position),
+        by_area=by_area,
         by_jump=own.by_jump + by_position,
         by_motion=moved if own.by_motion is None else own.by_motion + moved,
     )
@@ -486,11 +486,8 @@ def state_error(
     """
     torn, rows, layout = state.torn, state.rows, state.torn.layout
     trial = rows.multiplier - rows.step * rows.residual
-    feasible, compliance = FeasibleSet(layout, rows.slip_bound), torn.compliance.contact
-    if compliance is None:
-        miss = rows.multiplier - feasible.project(trial)
-    else:
-        miss = rows.multiplier - compliance.resolve(feasible, trial, rows.step)
+    feasible = FeasibleSet(layout, rows.slip_bound)
+    miss = rows.multiplier - torn.compliance.contact.resolve(feasible, trial, rows.step)
     slope = partials.by_multiplier - torn.jump(adjoint.displacement)
     tested = rows.residual + _bent(linearised, rows.multiplier)
     shares = adjoint.multiplier * tested - slope * _off_face(miss, linearised, layout)
@@ -503,8 +500,7 @@ def state_error(
 def _bent(linearised: LinearisedFace, multiplier: np.ndarray) -> np.ndarray:
     """Return κ s across the slip of slipping discs and what rows give way, zero in all others, owned."""
     face = linearised.face
-    across = face.curvature * face.restrict(multiplier) + face.offset
-    return np.asarray(linearised.face.prolong(across))
+    return np.asarray(face.prolong(face.bent(face.restrict(multiplier))))
 
 
 def _off_face(miss: np.ndarray, linearised: LinearisedFace, layout: ContactLayout) -> np.ndarray:

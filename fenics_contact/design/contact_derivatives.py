@@ -68,7 +68,7 @@ def bounds_by_area(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndar
 
 def closures_by_area(torn: TornSystem, multiplier: np.ndarray, adjoint: np.ndarray) -> np.ndarray | float:
     """Return dJ by the areas of points through compliances, ζ ∂C/∂A, replicated, (n_points,). Collective."""
-    if torn.compliance.contact is None:
+    if not torn.compliance.contact.gives_way:
         return 0.0
     by_area = slips_by_area(torn, multiplier, adjoint)
     if torn.groups.normal.closures is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,9 +14,7 @@ from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.scene import Scene
 from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
 from fenics_contact.feti.row_groups import Glued, Joint, RowGroup, Unknowns
-
-if TYPE_CHECKING:
-    from fenics_contact.qp.compliance import Compliance
+from fenics_contact.qp.face import ContactLaw
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +22,12 @@ class RowCompliance:
     """C(λ) of this rank's rows.
 
     `soft`: positions of rows of equality with a compliance among the owned ones; `constant`: that of each of
-    these, C(λ) = C λ; `contact`: that of contact rows, see `qp`; None where none has any.
+    these, C(λ) = C λ; `contact`: that of contact rows, see `qp`.
     """
 
     soft: np.ndarray
     constant: np.ndarray
-    contact: Compliance | None
+    contact: ContactLaw
 
     def added(self, product: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
         """Add C λ in rows of equality to an owned vector, in place, and return it."""
@@ -40,10 +38,8 @@ class RowCompliance:
         """Return λᵀC(λ) and Φ(λ), with Φ' = C, of this rank's rows, [force · length]."""
         force = multiplier[self.soft]
         work = float(force @ (self.constant * force))
-        if self.contact is None:
-            return work, 0.5 * work
-        pressing = float(multiplier @ self.contact.given_way(multiplier))
-        return work + pressing, 0.5 * work + self.contact.work(multiplier)
+        pressing, stored = self.contact.energies(multiplier)
+        return work + pressing, 0.5 * work + stored
 
 
 Kind = TypeVar("Kind", bound=RowGroup)

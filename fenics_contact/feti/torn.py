@@ -6,7 +6,6 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,10 +37,8 @@ from fenics_contact.feti.row_groups import Glued, Joint, RowGroup
 from fenics_contact.feti.subdomain import Assembled, Subdomain, assemble
 from fenics_contact.feti.ties import BondedTies, SlidingTies, TieRows
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, TrescaLaw
+from fenics_contact.qp.face import EXACT, ContactLaw
 from fenics_contact.qp.layout import ContactLayout
-
-if TYPE_CHECKING:
-    from fenics_contact.qp.compliance import Compliance
 
 
 def contact_and_tied_points(
@@ -194,9 +191,7 @@ class TornSystem:
         `displacement`: torn, of this rank, shape (torn_size,), [length]; `multiplier`: λ, owned. Rows of
         points that are known to stick are marked, owned.
         """
-        relative, compliance = self.relative(displacement), self.compliance.contact
-        if compliance is not None:
-            relative = relative - compliance.given_way(multiplier)
+        relative = self.relative(displacement) - self.compliance.contact.given_way(multiplier)
         return np.where(sticks, self.right + self.supported, relative), self.sliding(displacement)
 
     def with_slip_from(self, relative: np.ndarray, slid: np.ndarray) -> TornSystem:
@@ -352,10 +347,10 @@ class TornSystem:
         return RowCompliance(soft, constant[soft], self._compliance_of_contact)
 
     @property
-    def _compliance_of_contact(self) -> Compliance | None:
+    def _compliance_of_contact(self) -> ContactLaw:
         normal, slips = self.groups.normal, self.groups.slips
         if normal.closures is None and not slips.is_elastic:
-            return None
+            return EXACT
         from fenics_contact.qp.compliance import Closures, Compliance  # of no use in exact contact
 
         owned = self.numbering.owned_index(self.normal_rows) >= 0

@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from fenics_contact.qp.cones import FeasibleSet
+from fenics_contact.qp.face import ContactLaw, Face, FaceRows
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector
 
@@ -108,15 +109,15 @@ class Closures:
 
 
 @dataclass(frozen=True, eq=False)
-class SoftRows:
-    """The linearised compliances of contacts, C ≈ offset + slope λ, and those of friction discs.
+class SoftRows(FaceRows):
+    """The linearised compliances of contacts, C ≈ constant + slope λ, and those of friction discs.
 
     `stiffening`: 1 + ρ · slope of contacts; `step`: ρ of contacts; `slip`: slip per friction force of discs;
     `slip_step`: ρ of discs.
     """
 
     slope: Vector
-    offset: Vector
+    constant: Vector
     step: Vector
     slip: Vector
     slip_step: Vector
@@ -131,18 +132,49 @@ class SoftRows:
         """1 + ρ · slip of discs, shape (n_friction,)."""
         return 1.0 + self.slip_step * self.slip
 
-    @property
-    def inverses(self) -> tuple[Vector, Vector]:
-        """The inverses of large compliances κ of contacts and of discs, ρ (1 − 1/(1 + ρκ)) / (1 + ρκ)."""
+    def curvature(self, face: Face) -> Vector:
+        """Return κ in the columns of a face, shape (n_face,)."""
+        return face.spread(self.slope, self.slip)
+
+    def damping(self, face: Face) -> Vector:
+        """Return (1 + ρκ)^-½ in the columns of a face, one in others, shape (n_face,)."""
+        return face.spread(self.stiffening**-0.5, self.slip_stiffening**-0.5, 1.0)
+
+    def softness(self, face: Face) -> Vector:
+        """Return the inverses of large compliances κ, ρ (1 − 1/(1 + ρκ)) / (1 + ρκ), shape (n_face,)."""
         pairs = ((self.step, self.stiffening), (self.slip_step, self.slip_stiffening))
         contacts, discs = (step * (soft - 1.0) / soft**2 for step, soft in pairs)
-        return contacts, discs
+        return face.spread(contacts, discs)
+
+    def offset(self, face: Face) -> Vector:
+        """Return the constant parts in the columns of a face, shape (n_face,)."""
+        return face.spread(self.constant, np.zeros(len(self.slip)))
+
+    def bent(self, face: Face, curved: Vector) -> Vector:
+        """Return κ y with the constant parts, shape (n_face,)."""
+        return curved + face.offset
+
+    def homogeneous(self, face: Face) -> Face:
+        """Return the face without constant parts."""
+        return replace(face, soft=replace(self, constant=np.zeros_like(self.constant)))
+
+    def softened(self, layout: ContactLayout, step: Vector) -> Vector:
+        """Return ρ / (1 + ρκ), the steps of trial forces on rows that give way, owned."""
+        softened = step.copy()
+        softened[layout.normal] /= self.stiffening
+        softened[layout.tangential] /= self.slip_stiffening[:, None]
+        return softened
+
+    def slipping(self, layout: ContactLayout, trial: Vector, step: Vector) -> Vector:
+        """Return the forces w_T / (1 + ρκ) of the discs, shape (n_friction, t)."""
+        first = layout.tangential[:, :1]
+        return np.asarray(trial[layout.tangential] * self.softened(layout, step)[first] / step[first])
 
     def scaled(self, factor: Vector, discs: Vector) -> SoftRows:
         """Return those of multipliers λ / s, with the factors of contacts and of discs."""
         return SoftRows(
             self.slope * factor**2,
-            self.offset * factor,
+            self.constant * factor,
             self.step / factor**2,
             self.slip * discs**2,
             self.slip_step / discs**2,
@@ -150,7 +182,7 @@ class SoftRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Compliance:
+class Compliance(ContactLaw):
     """What this rank's contact rows give way: C(λ_N) along the normal, D τ along the tangents.
 
     `slip`: D of the friction discs, the elastic slip per friction force, owned.
@@ -159,6 +191,8 @@ class Compliance:
     layout: ContactLayout
     closures: Closures
     slip: Vector
+
+    gives_way: ClassVar[bool] = True
 
     def scaled(self, factor: Vector) -> Compliance:
         """Return the compliance of multipliers λ / s, with the factors s of all rows, owned."""
@@ -178,6 +212,10 @@ class Compliance:
         result[rows] = self.slip[:, None] * multiplier[rows]
         return result
 
+    def energies(self, multiplier: Vector) -> tuple[float, float]:
+        """Return λᵀC(λ) and Φ(λ) of this rank's rows, [force · length]."""
+        return float(multiplier @ self.given_way(multiplier)), self.work(multiplier)
+
     def work(self, multiplier: Vector) -> float:
         """Return Φ(λ) of this rank's rows, [force · length]."""
         layout, tau = self.layout, multiplier[self.layout.tangential]
@@ -191,6 +229,12 @@ class Compliance:
         force = feasible.project(softened)
         force[layout.normal] = self.closures.resolve(trial[layout.normal], step[layout.normal])
         return force
+
+    def pressed(self, trial: Vector, step: Vector) -> Vector:
+        """Return w with the normal forces that belong to it, which slip bounds follow, owned."""
+        rows, pressed = self.layout.normal, trial.copy()
+        pressed[rows] = self.closures.resolve(trial[rows], step[rows])
+        return pressed
 
     def rows_at(self, trial: Vector, step: Vector) -> SoftRows:
         """Return the compliances linearised where the law answers to w = λ − ρ r.

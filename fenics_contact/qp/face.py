@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
 
 if TYPE_CHECKING:
-    from fenics_contact.qp.compliance import Compliance, SoftRows
+    from fenics_contact.qp.cones import FeasibleSet
 
 #: A boolean for each multiplier.
 Marks = npt.NDArray[np.bool_]
@@ -23,6 +23,92 @@ Marks = npt.NDArray[np.bool_]
 #: Overshoot beyond which a slipping disc keeps its direction: the stiffness κ against rotation would swamp
 #: the other entries, and a step that ignores the rotation errs by the inverse of this.
 STEEP = 1e6
+
+
+@dataclass(frozen=True)
+class FaceRows:
+    """Contact rows of a face, linearised: they do not give way; `SoftRows` do."""
+
+    @property
+    def slip_stiffening(self) -> Vector | float:
+        """1 + ρ · slip per friction force of discs."""
+        return 1.0
+
+    def curvature(self, face: Face) -> Vector:
+        """Return zeros, shape (n_face,)."""
+        return np.zeros(face.n_face)
+
+    offset = curvature
+
+    def damping(self, face: Face) -> Vector:
+        """Return ones, shape (n_face,)."""
+        return np.ones(face.n_face)
+
+    def softness(self, face: Face) -> Vector | float:
+        """Return zero."""
+        return 0.0
+
+    def bent(self, face: Face, curved: Vector) -> Vector:
+        """Return κ y as it is."""
+        return curved
+
+    def homogeneous(self, face: Face) -> Face:
+        """Return the face as it is."""
+        return face
+
+    def scaled(self, factor: Vector, discs: Vector) -> FaceRows:
+        """Return itself."""
+        return self
+
+    def softened(self, layout: ContactLayout, step: Vector) -> Vector:
+        """Return ρ as it is."""
+        return step
+
+    def slipping(self, layout: ContactLayout, trial: Vector, step: Vector) -> Vector:
+        """Return the trial forces of the discs as they are, shape (n_friction, t)."""
+        return trial[layout.tangential]
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """By how much contact rows give way to forces: not at all, C = 0; `Compliance` is of rows that do."""
+
+    gives_way: ClassVar[bool] = False
+
+    def scaled(self, factor: Vector) -> ContactLaw:
+        """Return itself."""
+        return self
+
+    def given_way(self, multiplier: Vector) -> Vector | float:
+        """Return C(λ), zero."""
+        return 0.0
+
+    def sprung(self, multiplier: Vector) -> Vector | float:
+        """Return D τ, zero."""
+        return 0.0
+
+    def energies(self, multiplier: Vector) -> tuple[float, float]:
+        """Return zeros."""
+        return 0.0, 0.0
+
+    def work(self, multiplier: Vector) -> float:
+        """Return zero."""
+        return 0.0
+
+    def resolve(self, feasible: FeasibleSet, trial: Vector, step: Vector) -> Vector:
+        """Return P_Λ(w) of w = λ − ρ r, owned."""
+        return feasible.project(trial)
+
+    def pressed(self, trial: Vector, step: Vector) -> Vector:
+        """Return w as it is."""
+        return trial
+
+    def rows_at(self, trial: Vector, step: Vector) -> FaceRows:
+        """Return rows that do not give way."""
+        return FaceRows()
+
+
+EXACT = ContactLaw()
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +129,7 @@ class Face:
         direction: ŵ, direction of the friction force of a slipping disc, shape (n_friction, t), owned.
         overshoot: ‖w_T‖/Ψ ≥ 1 of a slipping disc and 1 elsewhere, shape (n_friction,), owned.
         flexibility: 1/ρ_T of the discs, shape (n_friction,), owned.
-        soft: Compliances of contacts and discs; None where there are none.
+        soft: Compliances of contacts and discs.
     """
 
     layout: ContactLayout
@@ -54,7 +140,7 @@ class Face:
     direction: Vector
     overshoot: Vector
     flexibility: Vector
-    soft: SoftRows | None = None
+    soft: FaceRows = FaceRows()
 
     @cached_property
     def restriction(self) -> sp.csr_matrix:
@@ -82,37 +168,30 @@ class Face:
     @cached_property
     def curvature(self) -> Vector:
         """κ = (‖w_T‖ − Ψ)/(ρ_T Ψ) on the offsets of slipping discs, compliances, else 0, shape (n_face,)."""
-        kappa = np.zeros(self.n_face)
-        if self.soft is not None:
-            self._spread(self.soft.slope, self.soft.slip, kappa)
-        sliding = self._sliding
+        kappa, sliding = self.soft.curvature(self), self._sliding
         kappa[self.n_face - len(sliding) :] = (self.overshoot[sliding] - 1.0) * self.flexibility[sliding]
         return kappa
 
     @cached_property
     def damping(self) -> Vector:
         """(1 + ρ_T κ)^-½, by which a preconditioner for F becomes one for F + κ, shape (n_face,)."""
-        factor = np.ones(self.n_face)
-        if self.soft is not None:
-            self._spread(self.soft.stiffening**-0.5, self.soft.slip_stiffening**-0.5, factor)
-        sliding = self._sliding
+        factor, sliding = self.soft.damping(self), self._sliding
         factor[self.n_face - len(sliding) :] = 1.0 / np.sqrt(self.overshoot[sliding])
         return factor
 
     @cached_property
     def offset(self) -> Vector:
         """The constant part of linearised closures, shape (n_face,)."""
-        result = np.zeros(self.n_face)
-        if self.soft is not None:
-            self._spread(self.soft.offset, np.zeros(len(self.slip)), result)
-        return result
+        return self.soft.offset(self)
+
+    def bent(self, y: Vector) -> Vector:
+        """Return κ y and the constant part of closures, shape (n_face,)."""
+        return self.soft.bent(self, self.curvature * y)
 
     @property
     def homogeneous(self) -> Face:
         """The face without the constant parts of closures, for what is linear in them."""
-        if self.soft is None:
-            return self
-        return replace(self, soft=replace(self.soft, offset=np.zeros_like(self.soft.offset)))
+        return self.soft.homogeneous(self)
 
     @cached_property
     def offset_stiffness(self) -> Vector:
@@ -124,24 +203,21 @@ class Face:
     @cached_property
     def softness(self) -> Vector | float:
         """What a preconditioner adds where a compliance exceeds F, shape (n_face,); zero without any."""
-        if self.soft is None:
-            return 0.0
-        result = np.zeros(self.n_face)
-        self._spread(*self.soft.inverses, result)
-        return result
+        return self.soft.softness(self)
 
-    def _spread(self, contacts: Vector, discs: Vector, result: Vector) -> None:
-        """Put values of closed contacts and of sticking discs in their columns."""
-        width = self.layout.tangential.shape[1]
+    def spread(self, contacts: Vector, discs: Vector, other: float = 0.0) -> Vector:
+        """Return values of closed contacts and of sticking discs in their columns, another in all others."""
+        width, result = self.layout.tangential.shape[1], np.full(self.n_face, other)
         values = np.concatenate([contacts[self.closed], np.repeat(discs[self.stick], width)])
         first = len(self.layout.equality)
         result[first : first + len(values)] = values
+        return result
 
     def scaled(self, factor: Vector) -> Face:
         """Return the face of multipliers λ / s, with the factors s of all rows, owned."""
         layout = self.layout
         discs = factor[layout.tangential[:, 0]]
-        soft = None if self.soft is None else self.soft.scaled(factor[layout.normal], discs)
+        soft = self.soft.scaled(factor[layout.normal], discs)
         return replace(self, flexibility=self.flexibility * discs**2, soft=soft)
 
     def restrict(self, x: Vector) -> Vector:
@@ -221,7 +297,7 @@ def classify(
     multiplier: Vector,
     residual: Vector,
     step: Vector,
-    compliance: Compliance | None = None,
+    compliance: ContactLaw = EXACT,
 ) -> Face:
     """Return the face on which the semismooth Newton method linearises w = λ − ρ r.
 
@@ -231,9 +307,9 @@ def classify(
     trial = multiplier - step * residual
     tangential = trial[layout.tangential]
     length = np.linalg.norm(tangential, axis=1)
-    soft = None if compliance is None else compliance.rows_at(trial, step)
+    soft = compliance.rows_at(trial, step)
     free = slip_bound > 0.0
-    slip = free & (length >= slip_bound * (1.0 if soft is None else soft.slip_stiffening))
+    slip = free & (length >= slip_bound * soft.slip_stiffening)
     divisor = np.where(slip, length, 1.0)
     return Face(
         layout=layout,

@@ -62,10 +62,7 @@ class FaceSystem:
 
     def gradient(self, multiplier: Vector, flexed: Vector) -> Vector:
         """Return Zᵀ(F λ − d) + κ y, shape (n_face,), for λ on the face and flexed = F λ − d."""
-        bent = self.face.curvature * self.face.restrict(multiplier)
-        if self.face.soft is not None:
-            bent += self.face.offset
-        return self.face.restrict(flexed) + bent
+        return self.face.restrict(flexed) + self.face.bent(self.face.restrict(multiplier))
 
     def enter(self, multiplier: Vector) -> Vector:
         """Return the owned vector on the face and in equilibrium that is closest to λ. Collective."""

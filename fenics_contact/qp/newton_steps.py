@@ -439,7 +439,7 @@ class FaceSteps:
 
     def _contradiction(self, system: FaceSystem, gradient: Vector) -> Contradiction | None:
         """Return what rows demand of each other; none does that gives way. Collective."""
-        if isinstance(self.operator, ShiftedOperator) or self.problem.compliance is not None:
+        if self.operator.gives_way or self.problem.compliance.gives_way:
             return None
         return contradiction(self.problem, system, gradient)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -14,13 +14,10 @@ import scipy.sparse as sp
 from fenics_contact._base.libraries import MPI
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.cones import FeasibleSet, SlipLaw, TrescaLaw
-from fenics_contact.qp.face import Face, Marks
+from fenics_contact.qp.cones import SlipLaw, TrescaLaw
+from fenics_contact.qp.face import EXACT, ContactLaw, Face, Marks
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
-
-if TYPE_CHECKING:
-    from fenics_contact.qp.compliance import Compliance
 
 Operator = Callable[[Vector], Vector]
 #: Called with the number of F-products so far and, after a step of a solver, with its residual.
@@ -119,7 +116,7 @@ class DualProblem:
         supported: Marks of contact rows that supports alone determine, owned, shape (size,): no multiplier
             moves them, and their diagonal is not a flexibility. None where there are no such rows.
         friction: The law of the slip bounds; None where no disc carries a force.
-        compliance: By how much contact rows give way to their forces; None where none does.
+        compliance: By how much contact rows give way to their forces.
         least: Sizes below which those of forces and jumps do not fall in residuals; None: no such sizes.
         given: c of all rows, the gaps before anything moves, owned, shape (size,), [length]; None where it
             does not matter where bodies without forces are.
@@ -138,7 +135,7 @@ class DualProblem:
     reach: Callable[[Vector, Vector], Vector] | None = None
     supported: Marks | None = None
     friction: SlipLaw | None = None
-    compliance: Compliance | None = None
+    compliance: ContactLaw = EXACT
     least: LeastSizes | None = None
     exact: Operator | None = None
     given: Vector | None = None
@@ -152,19 +149,6 @@ class DualProblem:
     def law(self) -> SlipLaw:
         """The law of `friction`; without one all slip bounds are zero."""
         return self.friction or TrescaLaw(self.layout, np.zeros(self.layout.n_friction))
-
-    def natural_force(self, feasible: FeasibleSet, trial: Vector, step: Vector) -> Vector:
-        """Return the force that the law of contact gives to w = λ − ρ r, owned: P_Λ(w) without compliance.
-
-        `trial`: w, owned; `step`: ρ, owned.
-        """
-        if self.compliance is None:
-            return feasible.project(trial)
-        return self.compliance.resolve(feasible, trial, step)
-
-    def given_way(self, multiplier: Vector) -> Vector | float:
-        """Return C(λ) of the compliance, owned; zero without one."""
-        return 0.0 if self.compliance is None else self.compliance.given_way(multiplier)
 
     @cached_property
     def is_loaded(self) -> bool:
@@ -274,7 +258,7 @@ class Scaling:
             scaling=Unscaled(),
             reach=None if reach is None else lambda x, alpha: s * reach(s * x, alpha),
             friction=None if friction is None else friction.scaled(discs),
-            compliance=None if problem.compliance is None else problem.compliance.scaled(s),
+            compliance=problem.compliance.scaled(s),
         )
 
 
@@ -323,6 +307,8 @@ def _unheard(products: int, residual: float | None) -> None:
 class CountedOperator:
     """The dual operator together with the number of times it was applied."""
 
+    gives_way, stiffness = False, 1.0
+
     def __init__(self, operator: Operator, report: Report = _unheard, exact: Operator | None = None) -> None:
         """Wrap ``operator``; ``exact`` is F in double precision where it is in single precision."""
         self._operator, self.report, self._exact = operator, report, exact or operator
@@ -350,7 +336,9 @@ class CountedOperator:
 
 
 class ShiftedOperator:
-    """x ↦ F x + D x with D diagonal; it counts the products of F."""
+    """x ↦ F x + D x with D diagonal, rows that give way; it counts the products of F."""
+
+    gives_way = True
 
     def __init__(self, operator: CountedOperator, shift: Vector, stiffness: float = 1.0) -> None:
         """Add ``shift``, the diagonal of D, (n_owned,), to F; ``stiffness`` is diag F / D on contact rows."""

@@ -80,9 +80,7 @@ class ProximalPoint:
         """Return the force of the springs at an iterate, P_Λ(λ̄ − D⁻¹ r), owned."""
         step = contact_step(self.original.layout, self.problem.diagonal)
         trial = iterate.multiplier - step * iterate.residual
-        if self.problem.compliance is not None:
-            return self.problem.natural_force(self.problem.law.feasible(trial), trial, step)
-        return self.problem.law.admit(trial)
+        return self.problem.compliance.resolve(self.problem.law.feasible(trial), trial, step)
 
 
 def descend(
@@ -131,7 +129,7 @@ def _slope(problem: DualProblem, before: Iterate, after: Iterate) -> Callable[[f
     def slope(part: float) -> float:
         multiplier = before.multiplier + part * moved
         trial = multiplier - step * (before.residual + part * turned)
-        missing = multiplier - problem.natural_force(problem.law.feasible(multiplier), trial, step)
+        missing = multiplier - problem.compliance.resolve(problem.law.feasible(multiplier), trial, step)
         missing[layout.equality] = (part - 1.0) * moved[layout.equality]
         return float(global_sum(problem.comm, opened @ missing)[0])
 
@@ -190,7 +188,7 @@ class Rescue:
     def __call__(self, start: Start, budget: int, *, further: bool = False, number: int = 0) -> Rescued:
         """Improve an iterate; ``number``: of the rescue within the solve, from 0. Collective."""
         problem, limit, memory = self.problem, start.operator.products + budget, start.memory
-        if problem.preconditioner is None and problem.compliance is None and problem.coarse.m:
+        if problem.preconditioner is None and not problem.compliance.gives_way and problem.coarse.m:
             iterate, line, memory = self._by_smalse(start, limit)
         else:
             factor = 1.0 if number < 4 else self.variety[(number - 4) % len(self.variety)]

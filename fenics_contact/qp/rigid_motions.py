@@ -128,12 +128,10 @@ class _Springs:
         contact = layout.contact
         trial = self.start + self.step * (self.rows @ z)
         bound = self.problem.law.bound(self.pressed(trial)) if bound is None else bound
-        force = self.problem.natural_force(FeasibleSet(layout, bound), trial, self.step)
+        force = self.problem.compliance.resolve(FeasibleSet(layout, bound), trial, self.step)
         w, p = trial[contact], force[contact]
         # ½‖w‖² − ½‖w − p‖² without its cancellation; its derivative is p.
-        energy = float((w - 0.5 * p) @ (p / self.step[contact]))
-        if self.problem.compliance is not None:
-            energy -= self.problem.compliance.work(force)
+        energy = float((w - 0.5 * p) @ (p / self.step[contact])) - self.problem.compliance.work(force)
         sums = global_sum(self.problem.comm, self.rows[contact].T @ p, energy)
         return _Balance(z, trial, bound, sums[:-1] - self.load, float(sums[-1] - self.load @ z))
 
@@ -150,7 +148,7 @@ class _Springs:
         """Return the norm of all forces. Collective."""
         contact = self.problem.layout.contact
         feasible = FeasibleSet(self.problem.layout, balance.bound)
-        force = self.problem.natural_force(feasible, balance.trial, self.step)
+        force = self.problem.compliance.resolve(feasible, balance.trial, self.step)
         sizes = global_sum(self.problem.comm, np.abs(self.rows[contact]).T @ np.abs(force[contact]))
         return float(max(np.linalg.norm(self.load), np.linalg.norm(sizes)))
 
@@ -158,29 +156,18 @@ class _Springs:
         """Return the derivative of the imbalance, shape (k, k). Collective."""
         normal, pairs = self.problem.layout.normal, self.problem.layout.tangential
         closed = normal[balance.trial[normal] > 0.0]
-        step = self._softened(balance)
+        soft = self.problem.compliance.rows_at(balance.trial, self.step)
+        step = soft.softened(self.problem.layout, self.step)
         local = self.rows[closed].T @ (step[closed, None] * self.rows[closed])
         moved = step[pairs, None] * self.rows[pairs]
-        local += np.einsum("iak,ial->kl", self.rows[pairs], self._slipped(balance, growth, moved))
+        trial = soft.slipping(self.problem.layout, balance.trial, self.step)
+        slipped = self._slipped(balance, trial, growth, step, moved)
+        local += np.einsum("iak,ial->kl", self.rows[pairs], slipped)
         return np.asarray(self.problem.comm.allreduce(local), dtype=np.float64)
 
     def pressed(self, trial: Vector) -> Vector:
         """Return w with the normal forces that belong to it, which slip bounds follow, owned."""
-        if self.problem.compliance is None:
-            return trial
-        rows, pressed = self.problem.layout.normal, trial.copy()
-        pressed[rows] = self.problem.compliance.closures.resolve(trial[rows], self.step[rows])
-        return pressed
-
-    def _softened(self, balance: _Balance) -> Vector:
-        """Return the stiffness ρ / (1 + ρ C') of springs on surfaces that give way, owned."""
-        if self.problem.compliance is None:
-            return self.step
-        soft, layout = self.problem.compliance.rows_at(balance.trial, self.step), self.problem.layout
-        softened = self.step.copy()
-        softened[layout.normal] /= soft.stiffening
-        softened[layout.tangential] /= soft.slip_stiffening[:, None]
-        return softened
+        return self.problem.compliance.pressed(trial, self.step)
 
     def let_go(self, direction: Vector, bound: Vector) -> bool:
         """Whether the load drives a motion for ever against a frozen bound: none balances it. Collective.
@@ -196,13 +183,11 @@ class _Springs:
         pressed, rubbed = global_sum(self.problem.comm, pressed, rubbed)
         return bool(pressed <= ROUNDING and rubbed < self.load @ direction)
 
-    def _slipped(self, balance: _Balance, growth: Vector | None, moved: Vector) -> Vector:
+    def _slipped(
+        self, balance: _Balance, trial: Vector, growth: Vector | None, step: Vector, moved: Vector
+    ) -> Vector:
         """Return the change of the friction forces when the trial ones change by ``moved``, (n, t, k)."""
         layout = self.problem.layout
-        trial = balance.trial[layout.tangential]
-        if self.problem.compliance is not None:
-            step = self.step[layout.tangential[:, :1]]
-            trial = trial * self._softened(balance)[layout.tangential[:, :1]] / step
         length = np.linalg.norm(trial, axis=1)
         slip = length > balance.bound
         direction = np.where(slip[:, None], trial / np.where(slip, length, 1.0)[:, None], 0.0)
@@ -211,7 +196,7 @@ class _Springs:
         change = shrink * (moved - direction[:, :, None] * along[:, None, :])
         if growth is not None:
             rows = layout.tangential_frictional
-            rate = np.where(balance.trial[rows] > 0.0, growth * self._softened(balance)[rows], 0.0)
+            rate = np.where(balance.trial[rows] > 0.0, growth * step[rows], 0.0)
             change += direction[:, :, None] * (rate[:, None] * self.rows[rows])[:, None, :]
         return np.asarray(change, dtype=np.float64)
 

@@ -292,7 +292,7 @@ class Smalse:
             InvalidInputError: The slip bound follows the multiplier.
             ConvergenceError: The product budget was used up; carries the history.
         """
-        if problem.compliance is not None:
+        if problem.compliance.gives_way:
             raise InvalidInputError(
                 "SMALSE needs surfaces that do not give way, got closure laws or a stick stiffness: "
                 "use FaceNewton"

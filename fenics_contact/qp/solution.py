@@ -121,7 +121,7 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     layout, equality, contact = problem.layout, problem.layout.equality, problem.layout.contact
     step = contact_step(layout, problem.diagonal)
     feasible = problem.law.feasible(multiplier)
-    mapped = problem.natural_force(feasible, multiplier - step * residual, step)
+    mapped = problem.compliance.resolve(feasible, multiplier - step * residual, step)
     free, error, needed = ~problem.between_supports, multiplier - mapped, step * problem.rhs
     idle = free & (multiplier == 0.0) & (mapped != 0.0)
     sums = global_sum(
@@ -355,7 +355,7 @@ def iterate_fitted(
     step = contact_step(problem.layout, problem.diagonal)
     face = classify(problem.layout, bound, multiplier, np.zeros_like(multiplier), step, problem.compliance)
     free = problem.coarse.restricted(face.restriction, whole=True)
-    alpha = free.coefficients(face.restrict(product - problem.rhs + problem.given_way(multiplier)))
+    alpha = free.coefficients(face.restrict(product - problem.rhs + problem.compliance.given_way(multiplier)))
     return iterate_at(problem, multiplier, product, alpha)
 
 
