@@ -25,7 +25,7 @@ from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_newton import FaceNewton
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, growing_basis
 from fenics_contact.qp.krylov import Kept, Stop, gmres
-from fenics_contact.qp.problem import CountedOperator, DualProblem, FacePreconditioner
+from fenics_contact.qp.problem import CountedOperator, DualProblem, FacePreconditioner, unknown_reach
 from fenics_contact.qp.reductions import Vector, global_sum
 from fenics_contact.qp.solution import apply_unless_zero
 from fenics_contact.qp.solve import solve
@@ -188,7 +188,7 @@ def whole_step(system: TangentSystem, multiplier: Vector, step: Vector, solver: 
     multiplier = np.concatenate([multiplier, np.zeros(len(step) - len(multiplier))])
     load = problem.coarse.load + problem.coarse.apply(multiplier)
     flexed = apply_unless_zero(problem, system.apply, multiplier)
-    problem = replace(problem.with_load(problem.rhs + flexed, load), reach=None)
+    problem = replace(problem.with_load(problem.rhs + flexed, load), reach=unknown_reach)
     solution = solve(problem, None, solver, multiplier, law=torn.law)
     bound = torn.law.bound(solution.multiplier)
     face = classify(problem.layout, bound, solution.multiplier, solution.residual, step, problem.compliance)

@@ -95,6 +95,11 @@ class Unscaled:
         return problem
 
 
+def unknown_reach(multiplier: Vector, alpha: Vector) -> Vector:
+    """Return zeros, owned: displacements are not known."""
+    return np.zeros_like(multiplier)
+
+
 @dataclass(frozen=True, eq=False)
 class DualProblem:
     """The data of a dual solver: an operator, a coarse space and the layout of vectors.
@@ -112,12 +117,12 @@ class DualProblem:
         preconditioner: Approximation of F⁻¹, symmetric positive definite, owned to owned, collective.
         scaling: Factors of multipliers between parts of different stiffness.
         reach: (λ, α) ↦ abs(B) abs(u), the size of the displacements at each row, owned, collective, with
-            which the jumps of a solution are compared. None where displacements are not known.
+            which the jumps of a solution are compared. Zero where displacements are not known.
         supported: Marks of contact rows that supports alone determine, owned, shape (size,): no multiplier
-            moves them, and their diagonal is not a flexibility. None where there are no such rows.
+            moves them, and their diagonal is not a flexibility. Or one mark for all.
         friction: The law of the slip bounds; None where no disc carries a force.
         compliance: By how much contact rows give way to their forces.
-        least: Sizes below which those of forces and jumps do not fall in residuals; None: no such sizes.
+        least: Sizes below which those of forces and jumps do not fall in residuals.
         given: c of all rows, the gaps before anything moves, owned, shape (size,), [length]; None where it
             does not matter where bodies without forces are.
         exact: F in double precision, owned to owned, collective, where `operator` is in single precision and
@@ -132,18 +137,18 @@ class DualProblem:
     diagonal: Vector
     preconditioner: Operator | None = None
     scaling: Scaling | Unscaled = Unscaled()
-    reach: Callable[[Vector, Vector], Vector] | None = None
-    supported: Marks | None = None
+    reach: Callable[[Vector, Vector], Vector] = unknown_reach
+    supported: Marks | bool = False
     friction: SlipLaw | None = None
     compliance: ContactLaw = EXACT
-    least: LeastSizes | None = None
+    least: LeastSizes = LeastSizes()
     exact: Operator | None = None
     given: Vector | None = None
 
     @cached_property
     def between_supports(self) -> Marks:
-        """The marks of `supported`, shape (size,), all false where there are none."""
-        return np.zeros(self.layout.size, dtype=bool) if self.supported is None else self.supported
+        """The marks of `supported`, shape (size,)."""
+        return np.broadcast_to(self.supported, self.layout.size)
 
     @cached_property
     def law(self) -> SlipLaw:
@@ -241,7 +246,6 @@ class Scaling:
     def applied_to(self, problem: DualProblem) -> DualProblem:
         """Return the problem for μ, see `DualProblem.scaled_problem`."""
         s, precondition, reach = self.factor, problem.preconditioner, problem.reach
-        discs, friction = s[problem.layout.tangential[:, 0]], problem.friction
 
         def scaled(F: Operator) -> Operator:
             return lambda x: s * F(s * x)
@@ -256,8 +260,8 @@ class Scaling:
             diagonal=s**2 * problem.diagonal,
             preconditioner=None if precondition is None else _scaled(precondition, s),
             scaling=Unscaled(),
-            reach=None if reach is None else lambda x, alpha: s * reach(s * x, alpha),
-            friction=None if friction is None else friction.scaled(discs),
+            reach=lambda x, alpha: s * reach(s * x, alpha),
+            friction=problem.law.scaled(s[problem.layout.tangential[:, 0]]),
             compliance=problem.compliance.scaled(s),
         )
 

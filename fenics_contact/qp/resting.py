@@ -38,13 +38,15 @@ class LooseMotions:
     size: float
 
     @classmethod
-    def of(cls, problem: DualProblem, multiplier: Vector, residual: Vector) -> LooseMotions | None:
-        """Return those of a multiplier and r, owned; None where there are none. Collective."""
+    def of(cls, problem: DualProblem, multiplier: Vector, residual: Vector) -> LooseMotions:
+        """Return those of a multiplier and r, owned. Collective."""
+        nothing, marks = np.zeros(0), np.zeros(0, dtype=bool)
+        none = cls(np.zeros((problem.coarse.m, 0)), np.zeros((0, 0)), nothing, nothing, marks, 0.0)
         if problem.given is None:
-            return None
+            return none
         correction = RigidMotionCorrection.build(problem)
         if correction.motions.shape[1] == 0:
-            return None
+            return none
         layout, comm = problem.layout, problem.comm
         pressed = multiplier[layout.normal] > LEAST_FORCE * problem.norm(multiplier)
         carried = np.zeros(layout.size, dtype=bool)
@@ -53,7 +55,7 @@ class LooseMotions:
         carried[layout.tangential] = ((bound > 0.0) & (size < bound * (1.0 - 1e-9)))[:, None]
         free = _unresisted(comm.allreduce(correction.rows[carried].T @ correction.rows[carried]))
         if free.shape[1] == 0:
-            return None
+            return none
         contact = layout.contact
         idle = contact[~carried[contact] & ~problem.between_supports[contact]]
         normal = np.zeros(layout.size, dtype=bool)

@@ -13,7 +13,7 @@ from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp.face import classify
 from fenics_contact.qp.layout import ContactLayout
-from fenics_contact.qp.problem import CountedOperator, DualProblem, LeastSizes, Operator
+from fenics_contact.qp.problem import CountedOperator, DualProblem, Operator
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 #: Forces below this fraction of those in all rows are rounding: residuals are not relative to them.
@@ -146,9 +146,8 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     if force_scale <= FORCE_FLOOR * max(force, force_mapped):
         force_scale = max(force, force_mapped)
     force_scale = max(force_scale, FORCE_FLOOR * max(everything, closing))
-    least = problem.least or LeastSizes()
-    force_scale = max(force_scale, least.force)
-    gluing_scale = max(cancelled, load, least.gluing) or rhs
+    force_scale = max(force_scale, problem.least.force)
+    gluing_scale = max(cancelled, load, problem.least.gluing) or rhs
     # Errors below the last places of all forces, and jumps of what the loads alone would open, or of what
     # contact forces displace, are none: an interference alone may displace nothing at supports. Neither are
     # jumps where nothing presses that are rounding of how far supports move bodies.
@@ -162,7 +161,7 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     return Residuals(
         natural=_ratio(distance, force_scale),
         gluing=_ratio(jump if jump > LAST_PLACES * max(load, pressed) else 0.0, gluing_scale),
-        coarse=_ratio(unbalanced, max(everything, loads, least.everything)),
+        coarse=_ratio(unbalanced, max(everything, loads, problem.least.everything)),
         violation=_ratio(violation if violation > rounding else 0.0, force_scale),
         force_scale=force_scale,
         gluing_scale=gluing_scale,
@@ -380,8 +379,6 @@ def answer_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha: 
     far.
     """
     iterate = iterate_at(problem, multiplier, product, alpha)
-    if problem.reach is None:
-        return iterate
     reach = problem.reach(multiplier, alpha)
     # Jumps in the last digits of displacements are none.
     jumps = np.where(np.abs(iterate.residual) > LAST_PLACES * reach, iterate.residual, 0.0)

@@ -12,7 +12,7 @@ from fenics_contact._base.progress import Task
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, together
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, TrescaLaw
-from fenics_contact.qp.problem import CountedOperator, DualProblem, LeastSizes
+from fenics_contact.qp.problem import CountedOperator, DualProblem, LeastSizes, unknown_reach
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 from fenics_contact.qp.resting import LooseMotions
 from fenics_contact.qp.solution import (
@@ -183,8 +183,7 @@ def solve(
 
 def _settled(problem: DualProblem, found: DualSolution, tolerance: float) -> DualSolution:
     """Return a solution with bodies on which nothing acts where they were, as far as they do not overlap."""
-    loose = LooseMotions.of(problem, found.multiplier, found.residual)
-    motion = None if loose is None else loose.settled()
+    motion = LooseMotions.of(problem, found.multiplier, found.residual).settled()
     if motion is None:
         return found
     moved = answer_at(problem, found.multiplier, found.product, found.alpha + motion)
@@ -229,7 +228,7 @@ def _run(problem: DualProblem, solver: DualSolver, begin: Start) -> DualSolution
         return solver.run(problem, begin)
     residuals, size = begin.iterate.residuals, problem.norm(begin.iterate.multiplier)
     least = LeastSizes(residuals.force_scale, residuals.gluing_scale, size)
-    found = solver.run(replace(problem, least=least, reach=None), begin)
+    found = solver.run(replace(problem, least=least, reach=unknown_reach), begin)
     # Zero is one of the answers: forces this small relative to those of the last load are none.
     if problem.norm(found.multiplier) <= max(solver.tolerance, min(100.0 * solver.tolerance, 1e-3)) * size:
         return replace(released, products=found.products)
@@ -353,8 +352,7 @@ def _at_rest(problem: DualProblem, begin: Start) -> Start:
     """Return the start without any force, where bodies do not overlap if that is possible. Collective."""
     nothing = np.zeros_like(begin.iterate.multiplier)
     iterate = iterate_fitted(problem, nothing, nothing)
-    loose = LooseMotions.of(problem, nothing, iterate.residual)
-    motion = None if loose is None else loose.settled()
+    motion = LooseMotions.of(problem, nothing, iterate.residual).settled()
     if motion is not None:
         iterate = iterate_at(problem, nothing, nothing, iterate.motions(problem) + motion)
     return replace(begin, iterate=iterate, cold=True)

@@ -47,8 +47,7 @@ def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
 
 def idle_motions(system: DualSystem, solution: DualSolution) -> tuple[UnheldMotion, ...]:
     """Return the motions by which contact opens that touches without a force. Collective."""
-    loose = LooseMotions.of(solution.problem, solution.multiplier, solution.residual)
-    ways = np.zeros((system.kernel.shape[1], 0)) if loose is None else loose.opening()
+    ways = LooseMotions.of(solution.problem, solution.multiplier, solution.residual).opening()
     if ways.shape[1] == 0:
         return ()
     return rigid_motions(system.torn, system.kernel.combined(sp.csr_matrix(ways)).tocsr())
