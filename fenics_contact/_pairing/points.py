@@ -20,7 +20,7 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import together
 from fenics_contact.mesh.faces import corners_of, match_faces
-from fenics_contact.qp.cones import Strengths
+from fenics_contact.qp.cones import Proportional, Strengths
 
 if TYPE_CHECKING:
     from fenics_contact.qp.compliance import Closures
@@ -377,11 +377,11 @@ def tangent_frames(normals: np.ndarray, axes: np.ndarray | None = None) -> np.nd
 
 def friction_data(
     scene: Scene, points: ContactPoints, comm: MPI.Comm
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, Strengths | None]:
+) -> tuple[np.ndarray, np.ndarray, Proportional]:
     """Return the friction data of each contact point. Collective on ``comm``.
 
-    Returns whether it has friction, shape (n,); its Coulomb coefficient (zero under Tresca), shape (n,); its
-    Tresca bound as a nodal force (zero under Coulomb), shape (n,), [force]; and limits and curves, if any.
+    Returns whether it has friction, shape (n,); its Tresca bound as a nodal force (zero under Coulomb), shape
+    (n,), [force]; and what follows the normal force (zero under Tresca).
     """
     has, coefficient, bound = np.zeros(points.count, dtype=bool), *np.zeros((2, points.count))
     places = scene.points[points.slave]
@@ -396,17 +396,15 @@ def friction_data(
     if comm.size > 1 and any(pair.friction_varies for pair in scene.contacts):
         values = np.stack([coefficient, bound])
         require_alike(comm, described(values, "friction given as functions of position"))
-    return has, coefficient, bound, _strengths(scene, points, comm, coefficient)
+    return has, bound, _strengths(scene, points, comm, coefficient)
 
 
-def _strengths(
-    scene: Scene, points: ContactPoints, comm: MPI.Comm, coefficient: np.ndarray
-) -> Strengths | None:
-    """Return limits of friction and its curves under pressure, None where there are none. Collective."""
+def _strengths(scene: Scene, points: ContactPoints, comm: MPI.Comm, coefficient: np.ndarray) -> Proportional:
+    """Return friction that follows the normal force, with its limits and curves, if any. Collective."""
     curves = [pair.friction_curve for pair in scene.contacts]
     limits = [pair.shear_limit for pair in scene.contacts]
     if all(each is None for each in (*curves, *limits)):
-        return None
+        return Proportional(coefficient)
     limit, places = np.full(points.count, np.inf), scene.points[points.slave]
     with together(comm):
         for number, pair in enumerate(scene.contacts):

@@ -60,8 +60,7 @@ def bounds_by_area(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndar
     by_area = np.zeros(torn.points.count)
     area = torn.points.area[torn.frictional]
     slope = torn.groups.slips.tresca_bound / np.where(area > 0.0, area, 1.0)
-    if torn.groups.slips.strengths is not None:
-        slope = slope + torn.groups.slips.strengths.by_area(normal_force[torn.frictional])
+    slope = slope + torn.groups.slips.strength.by_area(normal_force[torn.frictional])
     by_area[torn.frictional] = by_bound * slope
     return by_area
 
@@ -87,8 +86,7 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
     result, by_all = np.zeros((points.count, torn.components)), np.zeros(points.count)
     by_all[torn.frictional] = by_bound
     limited = np.zeros(points.count, dtype=bool)
-    if torn.groups.slips.strengths is not None:
-        limited[torn.frictional] = torn.groups.slips.strengths.limited(normal_force[torn.frictional])
+    limited[torn.frictional] = torn.groups.slips.strength.limited(normal_force[torn.frictional])
     places = torn.scene.points[points.slave]
     for index, pair in enumerate(torn.scene.contacts):
         if pair.friction_varies:

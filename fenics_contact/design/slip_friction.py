@@ -94,8 +94,7 @@ def _slopes(state: LinearState) -> tuple[np.ndarray, np.ndarray]:
     for number, pair in enumerate(torn.scene.contacts):
         if pair.slip_table is not None:
             slope[pairs == number] = pair.slip_table.growth(way[pairs == number])
-    if torn.groups.slips.strengths is not None:
-        slope[torn.groups.slips.strengths.limited(pressed)] = 0.0
+    slope[torn.groups.slips.strength.limited(pressed)] = 0.0
     slope[way == 0.0] = 0.0
     return slope * pressed, slip / np.where(way > 0.0, way, 1.0)[:, None]
 

@@ -24,7 +24,7 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact.feti.decomposition import Rows, Tearing
 from fenics_contact.feti.initial_gaps import gap_with_room
 from fenics_contact.feti.row_groups import RowGroup, columns_of
-from fenics_contact.qp.cones import Strengths
+from fenics_contact.qp.cones import Proportional
 
 if TYPE_CHECKING:
     from fenics_contact.qp.compliance import Closures
@@ -152,18 +152,21 @@ class TangentialRows(Relations):
     """The slip t_a·(u_slave − u_master): dim − 1 consecutive rows for each frictional point.
 
     `resting`: marks of rows along which supports prescribe no slip; `elastic_slip`: slip of sticking points
-    per friction force, replicated; `strengths`: slip bounds with limits or on curves in place of μ λ_N, whose
-    μ is then the largest ratio, replicated; None where there are none.
+    per friction force, replicated; `strength`: the part of slip bounds that follows λ_N, replicated.
     """
 
     from_before = True
 
     resting: np.ndarray
     frictional: np.ndarray
-    coefficient: np.ndarray
     tresca_bound: np.ndarray
     elastic_slip: np.ndarray
-    strengths: Strengths | None
+    strength: Proportional
+
+    @property
+    def coefficient(self) -> np.ndarray:
+        """μ of the frictional points, or the largest ratio of friction to normal force, (n_friction,)."""
+        return self.strength.coefficient
 
     def held(self, fixed: np.ndarray, parallel: float = 1e-6) -> np.ndarray:
         """Return which rows supports determine, alone or with the normal row, shape (n_rows,).
@@ -200,14 +203,13 @@ class TangentialRows(Relations):
         axes: LocalAxes = NO_AXES,
     ) -> TangentialRows:
         """Return those of the contact points of a scene. Collective on ``comm``."""
-        has_friction, coefficient, bound, strengths = friction_data(scene, points, comm)
+        has_friction, bound, strength = friction_data(scene, points, comm)
         frictional, dim = np.flatnonzero(has_friction), points.normal.shape[1]
         which, directions = np.repeat(frictional, dim - 1), points.tangents[frictional].reshape(-1, dim)
         driven = Relations(points, which, directions, axes=axes).of_supports(prescribed)
         return cls(
-            points, which, directions, driven == 0.0, frictional, coefficient[frictional], bound[frictional],
-            elastic_slip(scene, points)[frictional],
-            None if strengths is None else strengths.part(frictional), axes=axes,
+            points, which, directions, driven == 0.0, frictional, bound[frictional],
+            elastic_slip(scene, points)[frictional], strength.part(frictional), axes=axes,
         )  # fmt: skip
 
     @property
@@ -226,13 +228,8 @@ class TangentialRows(Relations):
 
     def slip_bound(self, normal_force: np.ndarray) -> np.ndarray:
         """Return Ψ at normal forces of the frictional points, shape (n_friction,), [force]."""
-        if self.strengths is not None:
-            return self.tresca_bound + self.strengths.bound(normal_force)
-        return np.asarray(self.tresca_bound + self.coefficient * np.maximum(normal_force, 0))
+        return np.asarray(self.tresca_bound + self.strength.bound(normal_force))
 
     def with_coefficient(self, coefficient: np.ndarray) -> TangentialRows:
         """Return the same rows with other friction coefficients, shape (n_friction,)."""
-        strengths = self.strengths
-        if strengths is not None:
-            strengths = replace(strengths, coefficient=coefficient)
-        return replace(self, coefficient=coefficient, strengths=strengths)
+        return replace(self, strength=replace(self.strength, coefficient=coefficient))

@@ -336,8 +336,7 @@ class TornSystem:
         discs, layout, slips = self.owned_discs, self.layout, self.groups.slips
         if not np.any(slips.coefficient > 0):
             return TrescaLaw(layout, slips.tresca_bound[discs])
-        strengths = None if slips.strengths is None else slips.strengths.part(discs)
-        return CoulombLaw(layout, slips.coefficient[discs], slips.tresca_bound[discs], strengths)
+        return CoulombLaw(layout, slips.strength.part(discs), slips.tresca_bound[discs])
 
     @cached_property
     def compliance(self) -> RowCompliance:

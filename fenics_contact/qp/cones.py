@@ -203,14 +203,55 @@ class StrengthCurve(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Strengths:
+class Proportional:
+    """Ψ(λ_N) = μ λ_N of friction discs.
+
+    `coefficient`: μ.
+    """
+
+    coefficient: Vector
+
+    def part(self, chosen: npt.NDArray[np.int64]) -> Proportional:
+        """Return those of some discs."""
+        return Proportional(self.coefficient[chosen])
+
+    def scaled(self, factor: Vector) -> Proportional:
+        """Return the bounds Ψ(s μ) / s of scaled normal forces."""
+        return self
+
+    def bound(self, normal: Vector) -> Vector:
+        """Return Ψ at normal forces λ_N, shape (n,), [force]."""
+        return np.asarray(self.coefficient * np.maximum(normal, 0.0))
+
+    def growth(self, normal: Vector) -> Vector:
+        """Return dΨ/dλ_N, shape (n,)."""
+        return self.coefficient
+
+    def limited(self, normal: Vector) -> npt.NDArray[np.bool_]:
+        """Return which discs are at a limit, shape (n,)."""
+        return np.zeros(len(normal), dtype=bool)
+
+    def by_area(self, normal: Vector) -> Vector:
+        """Return dΨ/dA at given normal forces, shape (n,)."""
+        return np.zeros(len(normal))
+
+    def outside(self, normal: Vector, given: Vector | float, length: Vector) -> npt.NDArray[np.bool_]:
+        """Return which friction forces are outside the cone ‖τ‖ ≤ Ψ₀ + μ λ_N, shape (n,)."""
+        return np.asarray(length > given + self.coefficient * normal)
+
+    def nearest(self, normal: Vector, peak: Vector) -> tuple[Vector, Vector]:
+        """Return the normal force of the nearest point, from that on the mantle, and Ψ there, (n,) each."""
+        return peak, self.coefficient * peak
+
+
+@dataclass(frozen=True, eq=False)
+class Strengths(Proportional):
     """Ψ(λ_N) = min(h(λ_N), Ψ_max) of friction discs, with h = μ λ_N or h = A t(λ_N / A).
 
     `coefficient`: μ; where there is a curve the least one with t(p) ≤ μ p; `limit`: Ψ_max; infinite where
     there is none; `area`: A; `curve`: number of the curve t, −1 where there is none.
     """
 
-    coefficient: Vector
     limit: Vector
     area: Vector
     curve: npt.NDArray[np.int64]
@@ -250,6 +291,20 @@ class Strengths:
         force = np.where(limited, self.limit, bound - growth * np.maximum(normal, 0.0))
         return np.where((self.curve >= 0) | limited, force / np.where(self.area > 0.0, self.area, 1.0), 0.0)
 
+    def outside(self, normal: Vector, given: Vector | float, length: Vector) -> npt.NDArray[np.bool_]:
+        """Return which friction forces are outside the cone, or beyond the limit, shape (n,)."""
+        return super().outside(normal, given, length) | (length > given + self.limit)
+
+    def nearest(self, normal: Vector, peak: Vector) -> tuple[Vector, Vector]:
+        """Return the normal force of the nearest point and Ψ there, shape (n,) each.
+
+        Cones end in cylinders: beyond their edge the normal force stays, or is that of the edge.
+        """
+        mu_f = self.coefficient
+        edge = np.divide(self.limit, mu_f, out=np.full_like(mu_f, np.inf), where=mu_f > 0.0)
+        peak = np.where(peak > edge, np.maximum(normal, edge), peak)
+        return peak, np.minimum(mu_f * peak, self.limit)
+
     def _rough(self, normal: Vector) -> tuple[Vector, Vector]:
         """Return h and dh/dλ_N."""
         force = np.maximum(normal, 0.0)
@@ -263,23 +318,20 @@ class Strengths:
 
 @dataclass(frozen=True, eq=False)
 class CoulombLaw:
-    """Slip bounds Ψ = Ψ₀ + μ max(λ_N, 0): a given part, zero by default, and one that follows λ_N.
+    """Slip bounds Ψ = Ψ₀ + h(λ_N): a given part, zero by default, and one that follows λ_N.
 
     With both parts it is the Mohr-Coulomb law, or Tresca's on some discs and Coulomb's on others.
-    `friction_coefficient`: μ per friction disc, owned; `given`: Ψ₀ per friction disc, owned, or one number
-    for all; `strengths`: what follows λ_N in place of μ λ_N, owned: with a limit, or on a curve. Its
-    coefficients are those above.
+    `strength`: h, owned; `given`: Ψ₀ per friction disc, owned, or one number for all.
     """
 
     layout: ContactLayout
-    friction_coefficient: Vector
+    strength: Proportional
     given: Vector | float = 0.0
-    strengths: Strengths | None = None
 
     def __post_init__(self) -> None:
         """Check coefficients and given bounds."""
         expected = (self.layout.n_friction,)
-        coefficient = np.asarray(self.friction_coefficient)
+        coefficient = np.asarray(self.strength.coefficient)
         if coefficient.shape != expected:
             raise InvalidInputError(
                 f"friction_coefficient must have shape {expected}, got {coefficient.shape}: "
@@ -294,22 +346,17 @@ class CoulombLaw:
         FeasibleSet(self.layout, given if given.ndim else np.full(expected, float(given)))
 
     def bound(self, multiplier: Vector) -> Vector:
-        """Return Ψ₀ + μ max(λ_N, 0)."""
-        normal = multiplier[self.layout.tangential_frictional]
-        if self.strengths is not None:
-            return self.given + self.strengths.bound(normal)
-        return self.given + self.friction_coefficient * np.maximum(normal, 0.0)
+        """Return Ψ₀ + h(λ_N)."""
+        return self.given + self.strength.bound(multiplier[self.layout.tangential_frictional])
 
     @property
     def grows(self) -> bool:
         """Whether any coefficient is positive."""
-        return bool(np.any(self.friction_coefficient > 0.0))
+        return bool(np.any(self.strength.coefficient > 0.0))
 
     def growth(self, multiplier: Vector) -> Vector:
         """Return the friction coefficient, or the slope of the curve; zero at a limit."""
-        if self.strengths is not None:
-            return self.strengths.growth(multiplier[self.layout.tangential_frictional])
-        return self.friction_coefficient
+        return self.strength.growth(multiplier[self.layout.tangential_frictional])
 
     def feasible(self, multiplier: Vector) -> FeasibleSet:
         """Return Λ(Ψ₀ + μ λ_N)."""
@@ -317,29 +364,21 @@ class CoulombLaw:
 
     def admit(self, multiplier: Vector) -> Vector:
         """Return the projection on the friction cones ‖τ‖ ≤ Ψ₀ + μ λ_N, λ_N ≥ 0, a convex set."""
-        layout, mu_f = self.layout, self.friction_coefficient
+        layout, mu_f = self.layout, self.strength.coefficient
         admitted = np.array(multiplier)
         admitted[layout.normal] = np.maximum(multiplier[layout.normal], 0.0)
         normal = multiplier[layout.tangential_frictional]
         tau = multiplier[layout.tangential]
         length = np.linalg.norm(tau, axis=1)
-        outside = (length > self.given + mu_f * normal) & (length > 0.0)
+        outside = self.strength.outside(normal, self.given, length) & (length > 0.0)
         # The nearest point of the mantle; where it has no normal force, of the disc at the cone's end.
         peak = np.maximum((normal + mu_f * (length - self.given)) / (1.0 + mu_f**2), 0.0)
-        radius = self.given + mu_f * peak
-        if self.strengths is not None:
-            # Cones end in cylinders: beyond their edge the normal force stays, or is that of the edge.
-            limit = self.strengths.limit
-            edge = np.divide(limit, mu_f, out=np.full_like(mu_f, np.inf), where=mu_f > 0.0)
-            peak = np.where(peak > edge, np.maximum(normal, edge), peak)
-            radius = self.given + np.minimum(mu_f * peak, limit)
-            outside |= length > self.given + limit
-        shrink = np.divide(radius, length, out=np.ones_like(length), where=outside)
+        peak, bound = self.strength.nearest(normal, peak)
+        shrink = np.divide(self.given + bound, length, out=np.ones_like(length), where=outside)
         admitted[layout.tangential_frictional[outside]] = peak[outside]
         admitted[layout.tangential] = np.minimum(shrink, 1.0)[:, None] * tau
         return admitted
 
     def scaled(self, factor: Vector) -> CoulombLaw:
         """Return the law with the given part Ψ₀ / s; μ is unchanged, as s is that of the whole contact."""
-        strengths = None if self.strengths is None else self.strengths.scaled(factor)
-        return CoulombLaw(self.layout, self.friction_coefficient, np.asarray(self.given / factor), strengths)
+        return CoulombLaw(self.layout, self.strength.scaled(factor), np.asarray(self.given / factor))

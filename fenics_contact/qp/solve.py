@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from fenics_contact._base.progress import Task
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, together
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.cones import CoulombLaw, SlipLaw, TrescaLaw
+from fenics_contact.qp.cones import CoulombLaw, Proportional, SlipLaw, TrescaLaw
 from fenics_contact.qp.problem import CountedOperator, DualProblem, LeastSizes, unknown_reach
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 from fenics_contact.qp.resting import LooseMotions
@@ -308,7 +308,7 @@ def _slip_law(
     layout = problem.layout
     if friction_coefficient is not None:
         given = 0.0 if slip_bound is None else np.asarray(slip_bound, dtype=np.float64)
-        return CoulombLaw(layout, np.asarray(friction_coefficient, dtype=np.float64), given)
+        return CoulombLaw(layout, Proportional(np.asarray(friction_coefficient, dtype=np.float64)), given)
     if slip_bound is None:
         if layout.n_friction:
             raise InvalidInputError(

@@ -59,7 +59,7 @@ def test_admitted_forces_are_the_nearest_of_a_cone_with_a_limit() -> None:
     rng = np.random.default_rng(0)
     layout = ContactLayout.build(3, normal=[0], tangential=[[1, 2]])
     strengths = Strengths(np.array([0.5]), np.array([1.0]), np.ones(1), np.array([-1]))
-    law = CoulombLaw(layout, np.array([0.5]), 0.2, strengths)
+    law = CoulombLaw(layout, strengths, 0.2)
     normal, radius = np.meshgrid(np.linspace(0.0, 6.0, 1201), np.linspace(0.0, 1.2, 241))
     inside = radius <= 0.2 + np.minimum(0.5 * normal, 1.0)
     for x in rng.uniform(-3.0, 5.0, (200, 3)):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.qp import DualProblem, FaceNewton, Stop, newton_steps, solve
-from fenics_contact.qp.cones import CoulombLaw
+from fenics_contact.qp.cones import CoulombLaw, Proportional
 from fenics_contact.qp.face import classify
 from fenics_contact.qp.face_system import FaceSystems
 from fenics_contact.qp.krylov import Enough, FaceStep, gmres, projected_cg, projected_gmres
@@ -20,7 +20,7 @@ from tests.qp.torn_bricks import Bricks, torn_problem
 
 def problem() -> DualProblem:
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
-    return dual.with_law(CoulombLaw(dual.layout, np.full(dual.layout.n_friction, 0.3)))
+    return dual.with_law(CoulombLaw(dual.layout, Proportional(np.full(dual.layout.n_friction, 0.3))))
 
 
 def test_conjugate_gradients_end_where_a_step_is_enough() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.qp import FaceNewton, Smalse, solve
-from fenics_contact.qp.cones import CoulombLaw, TrescaLaw
+from fenics_contact.qp.cones import CoulombLaw, Proportional, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.problem import Scaling
 from fenics_contact.qp.solve import find_equilibrium
@@ -53,7 +53,7 @@ def test_brick_held_by_next_to_nothing_converges(friction_coefficient):
 def test_one_loop_equals_the_fixed_point_of_tresca_problems():
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
     mu_f = np.linspace(0.25, 0.5, dual.layout.n_friction)
-    law = CoulombLaw(dual.layout, mu_f)
+    law = CoulombLaw(dual.layout, Proportional(mu_f))
     one_loop = solve(dual, None, FaceNewton(tolerance=1e-10), friction_coefficient=mu_f)
     step, products = None, 0
     first = find_equilibrium(dual.with_law(law)).multiplier
@@ -142,7 +142,7 @@ def test_bad_friction_coefficient_is_refused(friction_coefficient, message):
 
 def test_friction_cone_projection_is_the_nearest_point():
     problem = random_problem(3, n_contact=9, n_friction=7)
-    law = CoulombLaw(problem.layout, np.array([0.0, 0.1, 0.3, 1.0, 2.0, 0.5, 0.7]))
+    law = CoulombLaw(problem.layout, Proportional(np.array([0.0, 0.1, 0.3, 1.0, 2.0, 0.5, 0.7])))
     rng = np.random.default_rng(0)
     cases = 3.0 * rng.standard_normal((200, problem.layout.size))
     for x, y in zip(cases[::2], cases[1::2], strict=True):
@@ -160,7 +160,7 @@ def test_tresca_bound_does_not_depend_on_the_multiplier():
 
 def test_forces_that_pull_without_any_friction_are_admitted_as_none() -> None:
     layout = ContactLayout.build(6, normal=[0, 3], tangential=[[1, 2], [4, 5]])
-    law = CoulombLaw(layout, np.array([0.3, 0.3]), 0.0)
+    law = CoulombLaw(layout, Proportional(np.array([0.3, 0.3])), 0.0)
     admitted = law.admit(np.array([-1.0, 0.0, 0.0, 2.0, 0.0, 0.0]))
     np.testing.assert_array_equal(admitted, [0.0, 0.0, 0.0, 2.0, 0.0, 0.0])
 
@@ -311,12 +311,12 @@ def random_law(seed: int) -> CoulombLaw:
     rng = np.random.default_rng(seed)
     coefficient, given = rng.uniform(0, 1.5, COUNT), rng.uniform(0, 1.5, COUNT)
     coefficient[::5], given[::7] = 0.0, 0.0
-    return CoulombLaw(layout(), coefficient, given)
+    return CoulombLaw(layout(), Proportional(coefficient), given)
 
 
 def excess(law: CoulombLaw, points: np.ndarray) -> np.ndarray:
     """Return by how much points lie outside their cones."""
-    bound = law.given + law.friction_coefficient * points[:, 0]
+    bound = law.given + law.strength.coefficient * points[:, 0]
     return np.maximum(np.linalg.norm(points[:, 1:], axis=1) - bound, -points[:, 0])
 
 
@@ -346,7 +346,7 @@ def test_an_admissible_multiplier_is_left_as_it_is() -> None:
 
 def test_the_bound_has_both_parts() -> None:
     law, points = random_law(1), random_points(2)
-    expected = law.given + law.friction_coefficient * np.maximum(points[:, 0], 0.0)
+    expected = law.given + law.strength.coefficient * np.maximum(points[:, 0], 0.0)
     assert law.bound(points.ravel()) == pytest.approx(expected)
     assert law.feasible(points.ravel()).slip_bound == pytest.approx(expected)
 
@@ -402,5 +402,5 @@ def test_a_law_in_scaled_multipliers_has_the_same_answer() -> None:
 @pytest.mark.parametrize("given", [-1.0, np.nan, np.full(COUNT, -1.0)])
 def test_a_given_bound_that_is_none_is_refused(given) -> None:
     with pytest.raises(ValueError, match="slip_bound must be finite and not negative"):
-        CoulombLaw(layout(), np.zeros(COUNT), given)
+        CoulombLaw(layout(), Proportional(np.zeros(COUNT)), given)
     assert not TrescaLaw(layout(), np.zeros(COUNT)).grows

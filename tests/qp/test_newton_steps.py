@@ -26,7 +26,7 @@ from fenics_contact.qp import (
     solve,
 )
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.cones import CoulombLaw, TrescaLaw
+from fenics_contact.qp.cones import CoulombLaw, Proportional, TrescaLaw
 from fenics_contact.qp.face import classify
 from fenics_contact.qp.face_newton import slides
 from fenics_contact.qp.face_system import FaceSystems
@@ -46,7 +46,7 @@ from tests.qp.violations import coulomb_violations
 
 def problem() -> DualProblem:
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
-    return dual.with_law(CoulombLaw(dual.layout, np.full(dual.layout.n_friction, 0.3)))
+    return dual.with_law(CoulombLaw(dual.layout, Proportional(np.full(dual.layout.n_friction, 0.3))))
 
 
 def face(*closed: bool) -> Face:
@@ -242,7 +242,7 @@ def test_an_almost_unloaded_brick_on_a_round_one_is_solved(load: float) -> None:
 @pytest.mark.parametrize("preconditioned", [True, False])
 def test_a_rescue_comes_nearer_from_anywhere(preconditioned: bool) -> None:
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5, preconditioned=preconditioned))
-    dual = dual.with_law(CoulombLaw(dual.layout, np.full(dual.layout.n_friction, 0.3)))
+    dual = dual.with_law(CoulombLaw(dual.layout, Proportional(np.full(dual.layout.n_friction, 0.3))))
     far, operator = dual.coarse.particular(), CountedOperator(dual.operator)
     begin = iterate_at(dual, far, dual.operator(far), np.zeros(dual.coarse.m))
     rescue = Rescue(dual, Forcing(0.25, 0.1, 1e-6), 20_000, Smalse())
@@ -346,14 +346,14 @@ def test_admissible_multiplier_is_found_without_a_product():
 def test_sliding_limit_of_a_pulled_brick_is_found(friction_coefficient, held):
     dual, _ = torn_problem(Bricks(n=3, cubes=(2, 2), press=0.01, shear=0.002))
     mu_f = np.full(dual.layout.n_friction, friction_coefficient)
-    found = find_equilibrium(dual.with_law(CoulombLaw(dual.layout, mu_f)))
+    found = find_equilibrium(dual.with_law(CoulombLaw(dual.layout, Proportional(mu_f))))
     assert (found.motion is None) == held
 
 
 def test_unheld_motion_is_the_sliding_of_the_upper_brick():
     dual, torn = torn_problem(Bricks(n=3, shear=0.003))
     mu_f = np.full(dual.layout.n_friction, 0.2)
-    found = find_equilibrium(dual.with_law(CoulombLaw(dual.layout, mu_f)))
+    found = find_equilibrium(dual.with_law(CoulombLaw(dual.layout, Proportional(mu_f))))
     motions = np.einsum("ij,sj->si", torn.kernel, found.motion.reshape(-1, 6))
     translation = motions.reshape(len(torn.places), -1, 3).mean(axis=1)
     upper = np.linalg.norm(translation[torn.body == 1], axis=1).min()

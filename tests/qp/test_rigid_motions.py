@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.qp import DualProblem, FaceNewton, Smalse, solve
-from fenics_contact.qp.cones import CoulombLaw, TrescaLaw
+from fenics_contact.qp.cones import CoulombLaw, Proportional, TrescaLaw
 from fenics_contact.qp.rigid_motions import RigidMotionCorrection, _Springs
 from fenics_contact.qp.solution import contact_step
 from tests.qp.torn_bricks import Bricks, torn_problem
@@ -35,7 +35,8 @@ def gallery(**parameters) -> tuple[DualProblem, np.ndarray, np.ndarray]:
 def test_trial_forces_balance_the_load_of_the_floating_brick(kind: str):
     dual, multiplier, residual = gallery()
     ones = np.ones(dual.layout.n_friction)
-    law = TrescaLaw(dual.layout, 1e-3 * ones) if kind == "TrescaLaw" else CoulombLaw(dual.layout, 0.4 * ones)
+    coulomb = CoulombLaw(dual.layout, Proportional(0.4 * ones))
+    law = TrescaLaw(dual.layout, 1e-3 * ones) if kind == "TrescaLaw" else coulomb
     motions = RigidMotionCorrection.build(dual).motions
     assert motions.shape[1] == 6
     missing = []
@@ -50,7 +51,7 @@ def test_trial_forces_balance_the_load_of_the_floating_brick(kind: str):
 
 def test_the_motion_strains_no_glue_and_costs_no_product():
     dual, multiplier, residual = gallery()
-    law = CoulombLaw(dual.layout, np.full(dual.layout.n_friction, 0.4))
+    law = CoulombLaw(dual.layout, Proportional(np.full(dual.layout.n_friction, 0.4)))
 
     def no_product(x):
         raise AssertionError("rigid motions need no product")
