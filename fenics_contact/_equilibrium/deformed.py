@@ -424,8 +424,7 @@ def _energies(evaluation: ResidualState, earlier_friction_work: float) -> Energi
     """
     stored = [np.nan if response.energy is None else response.energy for response in evaluation.responses]
     strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
-    dead = evaluation.softening is None
-    work = evaluation.torn.load_work(evaluation.at.displacement) if dead else np.nan
+    work = evaluation.growth.work(evaluation.torn, evaluation.at.displacement)
     turned = evaluation.load.turned
     strain += sum(0.5 * float(each.springs @ each.motion**2) for each in turned)
     work += sum(each.work for each in turned if each.free.any())

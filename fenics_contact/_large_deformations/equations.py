@@ -12,7 +12,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._fem.composition import composition
 from fenics_contact._fem.mechanics import FROM_REST, MaterialStep, Mechanics, Response
-from fenics_contact._large_deformations.loading import Loading, RigidStart
+from fenics_contact._large_deformations.loading import DeadLoads, Loading, RigidStart
 from fenics_contact._large_deformations.moving_contact import (
     NO_ROWS,
     AuxiliaryRows,
@@ -20,8 +20,6 @@ from fenics_contact._large_deformations.moving_contact import (
     ContactConfiguration,
     MovingContact,
     stiffened,
-    unsymmetric_at,
-    with_added,
 )
 from fenics_contact._large_deformations.rigid_surfaces import (
     Motions,
@@ -130,8 +128,8 @@ class Configuration:
 class ResidualState:
     """The equations at a configuration, under a load.
 
-    `at`: the configuration; its history and its time are those before the load step; `softening`: −∂f/∂u of
-    this rank, torn; None where all loads are dead; `unbalanced`: f(u) − f_int(u) − Bᵀλ of this rank, torn;
+    `at`: the configuration; its history and its time are those before the load step; `growth`: that of loads
+    with u; `unbalanced`: f(u) − f_int(u) − Bᵀλ of this rank, torn;
     `constraint_residual`: c − B u, owned: gaps, minus the slip, and openings of glued rows; `least_jacobian`:
     smallest det F of all bodies; 1 where none is strained much.
     """
@@ -141,7 +139,7 @@ class ResidualState:
     at: Configuration
     responses: tuple[Response, ...]
     external: Vector
-    softening: sp.csr_matrix | None
+    growth: DeadLoads
     unbalanced: Vector
     constraint_residual: Vector
     residuals: Residuals
@@ -200,9 +198,7 @@ class ResidualState:
         That of the loads is made symmetric; for the other part there are `passed_on` and rows of its own.
         """
         tangents = [response.stiffness for response in self.responses]
-        if self.softening is None:
-            return tangents
-        return with_added(self.torn.decomposition, tangents, (self.softening + self.softening.T) / 2)
+        return self.growth.taken_from(tangents, self.torn.decomposition)
 
     def _require_finite_tangents(self) -> None:
         """Reject tangents with NaN or infinity, which no factorisation survives. Collective."""
@@ -216,23 +212,12 @@ class ResidualState:
                     "energy or stress of its material has a derivative"
                 )
 
-    def passed_on(self, moved: Vector) -> Vector:
-        """Return what neighbours and supports take of the unsymmetric part of the loads' growth. Collective.
-
-        Returns change of multipliers, owned, zero but in gluing rows and those of supports, [force].
-        """
-        if self.softening is None:
-            return np.zeros(len(self.constraint_residual))
-        return self.torn.gluing_of(0.5 * (self.softening.T - self.softening) @ moved)
-
     def linearised(
         self, timer: PhaseTimer, known: Linearisation | None, *, springs: bool = True
     ) -> Linearisation:
         """Factor the tangents, with those of springs of tools or without. Collective."""
         self._require_finite_tangents()
-        uneven = None
-        if self.softening is not None:
-            uneven = unsymmetric_at(self.torn.decomposition, self.softening, self.load.rim)
+        uneven = self.growth.unsymmetric(self.torn.decomposition, self.load.rim)
         turning = self.contact.turning(self.at.multiplier, uneven)
         if turning is not None and self.load.is_tracked and springs:
             turning = turning.with_springs(*spring_columns(self.load.turned, self.contact.prescribed.size))
@@ -400,12 +385,10 @@ class Equations:
             )
             moved = (at.displacement[part] for part in self.decomposition.parts)
             responses = tuple(map(_on_bed, responses, self._beds, moved))
-            external, softening = load.at(at.displacement)
+            external, growth = load.at(at.displacement)
             responses = tuple(map(_following, responses, self.decomposition.meshes))
             external = self.decomposition.on_followed(external)
-            if softening is not None:
-                follow = self.decomposition.following
-                softening = (follow.T @ softening @ follow).tocsr()
+            growth = growth.followed(self.decomposition)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
         # What is no more than rounding of strains and of positions is none.
@@ -421,9 +404,7 @@ class Equations:
             torn, natural, feasible.violation(at.multiplier), forces, open_, at.displacement, at.largest,
             self.stiffness,
         )  # fmt: skip
-        return ResidualState(
-            self, load, at, responses, external, softening, unbalanced, open_, residuals, least
-        )
+        return ResidualState(self, load, at, responses, external, growth, unbalanced, open_, residuals, least)
 
 
 @dataclass(frozen=True, eq=False)

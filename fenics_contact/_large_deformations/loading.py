@@ -20,6 +20,7 @@ from fenics_contact._large_deformations.rigid_surfaces import (
 )
 from fenics_contact._scene.fields import Ufl, evaluate
 from fenics_contact._scene.loads import ThermalStrain
+from fenics_contact._scene.local_axes import free_matrix
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.decomposition import Decomposition, prescribed_displacements
@@ -29,6 +30,118 @@ from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.faces import corners_of
 from fenics_contact.mesh.quality import similarity
 from fenics_contact.qp.reductions import Vector
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class UnsymmetricLowRank:
+    """An unsymmetric stiffness L Rᵀ of few columns.
+
+    `owner`: node whose rank owns the rows of a column.
+    """
+
+    left: sp.csr_matrix
+    right: sp.csr_matrix
+    owner: np.ndarray
+
+
+def unsymmetric_at(
+    decomposition: Decomposition, stiffness: sp.csr_matrix, nodes: np.ndarray
+) -> UnsymmetricLowRank:
+    """Return the unsymmetric part of a torn stiffness on the free dofs of some nodes. Collective."""
+    tearing, dim = decomposition.tearing, decomposition.tearing.components
+    here, block = decomposition.held
+    node = np.empty(len(here), dtype=np.int64)
+    node[block] = tearing.copy_node[here]
+    dof = (dim * node[:, None] + np.arange(dim)).ravel()
+    skew = sp.coo_matrix((stiffness - stiffness.T) / 2)
+    row, column = dof[skew.row], dof[skew.col]
+    free = (~decomposition.fixed).ravel()
+    # There components of the coordinates are neither free nor held.
+    free.reshape(-1, dim)[decomposition.axes.nodes] = True
+    kept = nodes[row // dim] & free[row] & free[column]
+    mine = (row[kept], column[kept], skew.data[kept], float(np.abs(stiffness.data).max(initial=0.0)))
+    parts = decomposition.comm.allgather(mine)
+    rows, columns, values = (np.concatenate([part[place] for part in parts]) for place in range(3))
+    matrix = sp.csr_matrix((values, (rows, columns)), shape=(len(free),) * 2)
+    if decomposition.axes:
+        onto = free_matrix(decomposition.fixed, decomposition.axes)
+        matrix = (onto @ matrix @ onto).tocsr()
+    # Between neighbours it cancels but for rounding.
+    matrix.data[np.abs(matrix.data) <= ROUNDING * max(part[3] for part in parts)] = 0.0
+    matrix.eliminate_zeros()
+    changed = np.flatnonzero(np.diff(matrix.indptr))
+    entries = np.ones(len(changed)), (changed, np.arange(len(changed)))
+    left = sp.csr_matrix(entries, shape=(len(free), len(changed)))
+    return UnsymmetricLowRank(left, matrix[changed].T.tocsr(), changed // dim)
+
+
+def with_added(
+    decomposition: Decomposition, tangents: Sequence[sp.csr_matrix], added: sp.csr_matrix
+) -> list[sp.csr_matrix]:
+    """Return the tangents of this rank's subdomains with the blocks of a torn matrix added to them."""
+    each = zip(tangents, decomposition.parts, strict=True)
+    return [(K + added[part, part]).tocsr() for K, part in each]
+
+
+class DeadLoads:
+    """The growth of loads with the displacement where there is none."""
+
+    def plus(self, softening: sp.csr_matrix) -> DeadLoads:
+        """Return it with that of further loads, −∂f/∂u of this rank, torn."""
+        return GrowingLoads(softening)
+
+    def followed(self, decomposition: Decomposition) -> DeadLoads:
+        """Return it on nodes that do not follow others."""
+        return self
+
+    def taken_from(self, tangents: list[sp.csr_matrix], decomposition: Decomposition) -> list[sp.csr_matrix]:
+        """Return the tangents of this rank's subdomains less its symmetric part."""
+        return tangents
+
+    def passed_on(self, torn: TornSystem, moved: Vector) -> Vector:
+        """Return what neighbours and supports take of its unsymmetric part. Collective.
+
+        Returns change of multipliers, owned, zero but in gluing rows and those of supports, [force].
+        """
+        return np.zeros(len(torn.numbering.owned))
+
+    def unsymmetric(self, decomposition: Decomposition, nodes: np.ndarray) -> list[UnsymmetricLowRank]:
+        """Return its unsymmetric part on the free dofs of some nodes. Collective."""
+        return []
+
+    def work(self, torn: TornSystem, displacement: Vector) -> float:
+        """Return the work of loads; NaN where it depends on the way. Collective."""
+        return torn.load_work(displacement)
+
+
+@dataclass(frozen=True, eq=False)
+class GrowingLoads(DeadLoads):
+    """The growth of loads that depend on the displacement.
+
+    `softening`: −∂f/∂u of this rank, torn.
+    """
+
+    softening: sp.csr_matrix
+
+    def plus(self, softening: sp.csr_matrix) -> DeadLoads:
+        return GrowingLoads(self.softening + softening)
+
+    def followed(self, decomposition: Decomposition) -> DeadLoads:
+        follow = decomposition.following
+        return GrowingLoads((follow.T @ self.softening @ follow).tocsr())
+
+    def taken_from(self, tangents: list[sp.csr_matrix], decomposition: Decomposition) -> list[sp.csr_matrix]:
+        return with_added(decomposition, tangents, (self.softening + self.softening.T) / 2)
+
+    def passed_on(self, torn: TornSystem, moved: Vector) -> Vector:
+        return torn.gluing_of(0.5 * (self.softening.T - self.softening) @ moved)
+
+    def unsymmetric(self, decomposition: Decomposition, nodes: np.ndarray) -> list[UnsymmetricLowRank]:
+        return [unsymmetric_at(decomposition, self.softening, nodes)]
+
+    def work(self, torn: TornSystem, displacement: Vector) -> float:
+        return np.nan
 
 
 @displayed
@@ -207,22 +320,16 @@ class Loading:
             marks |= pressures.rim
         return marks
 
-    def at(self, displacement: Vector) -> tuple[Vector, sp.csr_matrix | None]:
-        """Return the forces on deformed bodies, and the stiffness of those that follow their surfaces.
-
-        Returns forces of this rank, torn, shape (torn_size,), [force]; less their growth with u, shape
-        (torn_size, torn_size), None where all are dead.
-        """
-        force, softening = self.torn.load, None
+    def at(self, displacement: Vector) -> tuple[Vector, DeadLoads]:
+        """Return the forces on deformed bodies of this rank, torn, (torn_size,), and their growth."""
+        force, growth = self.torn.load, DeadLoads()
         for weight, pressures in self.following:
             more, matrix = pressures.at(displacement)
-            force, matrix = force + weight * more, weight * matrix
-            softening = matrix if softening is None else softening + matrix
+            force, growth = force + weight * more, growth.plus(weight * matrix)
         if self.drag is not None:
             force = force - self.drag.on(displacement)
-            matrix = sp.diags(self.drag.viscosity, format="csr")
-            softening = matrix if softening is None else softening + matrix
-        return force, softening
+            growth = growth.plus(sp.diags(self.drag.viscosity, format="csr"))
+        return force, growth
 
 
 def _between(first: np.ndarray | None, last: np.ndarray | None, part: float) -> np.ndarray | None:

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
-from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._large_deformations.loading import Loading, UnsymmetricLowRank, with_added
 from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.local_axes import LocalAxes, free_matrix
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane, RigidTool
@@ -36,19 +36,6 @@ if TYPE_CHECKING:
 
 
 _NONE = np.zeros(0, dtype=np.int64)
-
-
-@displayed
-@dataclass(frozen=True, eq=False)
-class UnsymmetricLowRank:
-    """An unsymmetric stiffness L Rᵀ of few columns.
-
-    `owner`: node whose rank owns the rows of a column.
-    """
-
-    left: sp.csr_matrix
-    right: sp.csr_matrix
-    owner: np.ndarray
 
 
 @displayed
@@ -156,37 +143,6 @@ def _joined(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
 
 def _lengths(columns: sp.csr_matrix) -> np.ndarray:
     return np.sqrt(np.bincount(columns.indices, columns.data**2, columns.shape[1]))
-
-
-def unsymmetric_at(
-    decomposition: Decomposition, stiffness: sp.csr_matrix, nodes: np.ndarray
-) -> UnsymmetricLowRank:
-    """Return the unsymmetric part of a torn stiffness on the free dofs of some nodes. Collective."""
-    tearing, dim = decomposition.tearing, decomposition.tearing.components
-    here, block = decomposition.held
-    node = np.empty(len(here), dtype=np.int64)
-    node[block] = tearing.copy_node[here]
-    dof = (dim * node[:, None] + np.arange(dim)).ravel()
-    skew = sp.coo_matrix((stiffness - stiffness.T) / 2)
-    row, column = dof[skew.row], dof[skew.col]
-    free = (~decomposition.fixed).ravel()
-    # There components of the coordinates are neither free nor held.
-    free.reshape(-1, dim)[decomposition.axes.nodes] = True
-    kept = nodes[row // dim] & free[row] & free[column]
-    mine = (row[kept], column[kept], skew.data[kept], float(np.abs(stiffness.data).max(initial=0.0)))
-    parts = decomposition.comm.allgather(mine)
-    rows, columns, values = (np.concatenate([part[place] for part in parts]) for place in range(3))
-    matrix = sp.csr_matrix((values, (rows, columns)), shape=(len(free),) * 2)
-    if decomposition.axes:
-        onto = free_matrix(decomposition.fixed, decomposition.axes)
-        matrix = (onto @ matrix @ onto).tocsr()
-    # Between neighbours it cancels but for rounding.
-    matrix.data[np.abs(matrix.data) <= ROUNDING * max(part[3] for part in parts)] = 0.0
-    matrix.eliminate_zeros()
-    changed = np.flatnonzero(np.diff(matrix.indptr))
-    entries = np.ones(len(changed)), (changed, np.arange(len(changed)))
-    left = sp.csr_matrix(entries, shape=(len(free), len(changed)))
-    return UnsymmetricLowRank(left, matrix[changed].T.tocsr(), changed // dim)
 
 
 @displayed
@@ -297,14 +253,6 @@ def stiffened(
     return with_added(decomposition, tangents, added)
 
 
-def with_added(
-    decomposition: Decomposition, tangents: Sequence[sp.csr_matrix], added: sp.csr_matrix
-) -> list[sp.csr_matrix]:
-    """Return the tangents of this rank's subdomains with the blocks of a torn matrix added to them."""
-    each = zip(tangents, decomposition.parts, strict=True)
-    return [(K + added[part, part]).tocsr() for K, part in each]
-
-
 #: Number of facets that supports and obstacles may pass within a step: contact is searched where nodes are.
 FACETS = 2.0
 
@@ -371,9 +319,11 @@ class ContactConfiguration:
         )
         return np.asarray(across & held)
 
-    def turning(self, multiplier: Vector, pressure: UnsymmetricLowRank | None) -> FollowerStiffness | None:
-        """Return the stiffness of forces that turn with their surfaces; None without any. Collective."""
-        further = [] if pressure is None else [pressure]
+    def turning(self, multiplier: Vector, further: list[UnsymmetricLowRank]) -> FollowerStiffness | None:
+        """Return the stiffness of forces that turn with their surfaces; None without any. Collective.
+
+        `further`: that of pressures.
+        """
         if self.points is None or self.start is None:
             return FollowerStiffness.of(None, further) if further else None
         normal, friction = self.at_points(multiplier)

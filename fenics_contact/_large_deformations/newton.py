@@ -329,7 +329,7 @@ class _Run:
             change = taken.multiplier[: len(evaluation.at.multiplier)] - evaluation.at.multiplier
             further = taken.multiplier[len(change) :]
             moved = near.system.displacement(np.concatenate([change, further]), taken.motions)
-            change = change + evaluation.passed_on(moved)
+            change = change + evaluation.growth.passed_on(evaluation.torn, moved)
         # (d) The step, as far as cells and the active set allow.
         tracked = evaluation.torn.free.tracked
         turned = taken.motions[len(taken.motions) - evaluation.torn.free.count :][:tracked]
