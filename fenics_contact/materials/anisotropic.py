@@ -35,8 +35,7 @@ def checked_axes(orientation: tuple[Triple, Triple, Triple]) -> tuple[Triple, Tr
     axes = np.array(orientation, dtype=np.float64)
     if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-8):
         raise InvalidInputError(
-            f"orientation must hold three orthonormal material axes as rows, got {orientation!r}: "
-            "build it with material_axes(first, second)"
+            f"orientation must be three orthonormal rows, got {orientation!r}: use material_axes(a, b)"
         )
     return tuple(tuple(float(c) for c in axis) for axis in axes)  # type: ignore[return-value]
 
@@ -111,22 +110,18 @@ class AnisotropicElasticity(SpatialElasticity):
         except (TypeError, ValueError):
             C = np.zeros(0)
         if C.shape != (6, 6) or not np.isfinite(C).all():
-            raise InvalidInputError(
-                f"moduli must be six rows of six finite numbers, got {self.moduli!r}: {order}"
-            )
+            raise InvalidInputError(f"moduli must be 6 x 6 finite numbers, got {self.moduli!r}: {order}")
         if np.abs(C - C.T).max() > 1e-9 * np.abs(C).max():
             i, j = np.unravel_index(np.abs(C - C.T).argmax(), C.shape)
             raise InvalidInputError(
-                f"moduli must be symmetric, got {C[i, j]:g} in row {i + 1}, column {j + 1} and {C[j, i]:g} "
-                f"in row {j + 1}, column {i + 1}: correct one of them"
+                f"moduli must be symmetric, got [{i}][{j}] = {C[i, j]:g}, [{j}][{i}] = {C[j, i]:g}: fix one"
             )
         size = np.sqrt(np.abs(np.diag(C)))
         scaled = C / np.outer(size, size) if size.all() else np.zeros((6, 6))
         least = np.linalg.eigvalsh(scaled).min()
         if not least > 1e-12:
             raise InvalidInputError(
-                "moduli must give a positive energy, the smallest eigenvalue of the matrix, scaled to ones "
-                f"on its diagonal, is {least:.3g}: correct them; the order is xx, yy, zz, yz, xz, xy"
+                f"moduli must give a positive energy, a scaled eigenvalue is {least:.3g}: {order}"
             )
         rows = tuple(tuple(float(value) for value in row) for row in C)
         object.__setattr__(self, "moduli", rows)

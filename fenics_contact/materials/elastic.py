@@ -16,17 +16,18 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.kernels import rigid_body_modes
 
 
+def require_positive(name: str, value: float, meaning: str) -> None:
+    """Reject a constant that is not finite and above zero."""
+    if not (np.isfinite(value) and value > 0):
+        raise InvalidInputError(f"{name} must be a positive number, got {value!r}: {meaning}")
+
+
 def check_isotropic(young_modulus: float, poisson_ratio: float, thermal_expansion: float | None) -> None:
     """Reject constants for which the strain energy is not positive."""
-    if not (np.isfinite(young_modulus) and young_modulus > 0):
-        raise InvalidInputError(
-            f"young_modulus must be a positive number, got {young_modulus!r}: "
-            "give E in force per area, for steel 2.1e5 in N/mm²"
-        )
+    require_positive("young_modulus", young_modulus, "give E in force per area, for steel 2.1e5 in N/mm²")
     if not -1 < poisson_ratio < 0.5:
         raise InvalidInputError(
-            f"poisson_ratio must lie between -1 and 0.5 (excluded), got {poisson_ratio!r}: "
-            "use 0.3 for steel; incompressible bodies need another model"
+            f"poisson_ratio must lie between -1 and 0.5 (excluded), got {poisson_ratio!r}: use 0.3 for steel"
         )
     check_expansion(thermal_expansion)
 
@@ -35,8 +36,7 @@ def check_expansion(thermal_expansion: float | None) -> None:
     """Reject an expansion that is not finite."""
     if thermal_expansion is not None and not np.isfinite(thermal_expansion):
         raise InvalidInputError(
-            f"thermal_expansion must be a finite number or None, got {thermal_expansion!r}: give the "
-            "strain per degree, for steel 1.2e-5"
+            f"thermal_expansion must be a finite number or None, got {thermal_expansion!r}: for steel 1.2e-5"
         )
 
 
@@ -145,11 +145,8 @@ class Plate(Elasticity):
 
 def check_thickness(thickness: float | None) -> None:
     """Reject a thickness that is not positive."""
-    if thickness is not None and not (np.isfinite(thickness) and thickness > 0):
-        raise InvalidInputError(
-            f"thickness must be a positive number, got {thickness!r}: give it as a length, or None for "
-            "forces per unit of thickness"
-        )
+    if thickness is not None:
+        require_positive("thickness", thickness, "give a length, or None for forces per unit of thickness")
 
 
 def thickness_of(material: object) -> float | None:
@@ -430,8 +427,6 @@ def checked_stiffness(compliance: np.ndarray, constants: str) -> np.ndarray:
     smallest = np.linalg.eigvalsh(compliance / np.outer(scale, scale)).min()
     if not smallest > 1e-12:
         raise InvalidInputError(
-            f"engineering constants must give a positive energy, {constants} do not (smallest eigenvalue of "
-            f"the scaled compliance {smallest:.3g}): reduce the Poisson ratios, ν_ij² < E_i / E_j for each "
-            "pair is necessary"
+            f"{constants} give no positive energy: reduce the Poisson ratios, ν_ij² < E_i / E_j must hold"
         )
     return np.asarray(np.linalg.inv(compliance), dtype=np.float64)

@@ -14,6 +14,8 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import check_expansion, numbers
 from fenics_contact.materials.hyperelastic import (
     Hyperelasticity,
+    check_exponents,
+    check_moduli,
     deformation_gradient,
     gradient_in_space,
     isochoric_invariants,
@@ -56,21 +58,12 @@ class Hyperfoam(Hyperelasticity):
         order, count = "give one μ, one exponent and one ν for each term", np.size(self.shear_moduli)
         for name in ("shear_moduli", "exponents", "poisson_ratios"):
             object.__setattr__(self, name, numbers(name, getattr(self, name), count, order))
-        if not all(self.exponents):
-            raise InvalidInputError(
-                f"exponents must not be zero, got {self.exponents}: leave out the terms without influence"
-            )
+        check_exponents(self.exponents)
         if not all(0 <= nu < 0.5 for nu in self.poisson_ratios):
             raise InvalidInputError(
-                f"poisson_ratios must lie between 0 and 0.5 (excluded), got {self.poisson_ratios}: foams of "
-                "other ratios need another model"
+                f"poisson_ratios must lie between 0 and 0.5, got {self.poisson_ratios}: use another model"
             )
-        if not (sum(self.shear_moduli) > 0 and self._bulk(self.shear_moduli) > 0):
-            raise InvalidInputError(
-                "the moduli of small strains must be positive numbers, got the shear modulus Σ μ_p = "
-                f"{sum(self.shear_moduli):g} and the bulk modulus {self._bulk(self.shear_moduli):g}: give "
-                "constants in force per area"
-            )
+        check_moduli("the shear modulus Σ μ_p", sum(self.shear_moduli), self._bulk(self.shear_moduli))
 
     @property
     def parameters(self) -> tuple[float, ...]:

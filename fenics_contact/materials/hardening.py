@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.elastic import require_positive
 
 #: Points of a curve: plastic strain, and stress [force / length²].
 Points = tuple[tuple[float, float], ...]
@@ -69,14 +70,13 @@ def checked_curve(name: str, points: Sequence[Sequence[float]], first: float) ->
         table = np.full((1, 2), np.nan)
     if not np.isfinite(table).all():
         raise InvalidInputError(
-            f"{name} must be pairs of a plastic strain and a stress, got {points!r}: give finite numbers, "
-            "such as ((0.02, 290.0), (0.1, 340.0))"
+            f"{name} must be pairs (plastic strain, stress), got {points!r}: such as ((0.02, 290.0),)"
         )
     strains = np.append(0.0, table[:, 0])
     if (np.diff(strains) <= 0).any() or (table[:, 1] < 0).any():
         raise InvalidInputError(
-            f"the plastic strains of {name} must ascend from above zero, and its stresses be at least zero, "
-            f"got {points!r}: the stress at zero plastic strain is {first:g} already, leave that point out"
+            f"{name} must have ascending strains above 0 and no negative stress, got {points!r}: leave out "
+            f"strain 0, where the stress is {first:g} already"
         )
     return tuple((float(strain), float(stress)) for strain, stress in table)
 
@@ -85,28 +85,21 @@ def check_plastic(young_modulus: float, hardening: Hardening, kinematic: Curve) 
     """Reject constants for which plastic flow does not exist or is not unique."""
     yield_stress, slope = hardening.curve.points[0][1], float(hardening.curve.slopes.min())
     back = float(kinematic.slopes.min())
-    if not (np.isfinite(yield_stress) and yield_stress > 0):
-        raise InvalidInputError(
-            f"yield_stress must be a positive number, got {yield_stress!r}: give it in force per area, for "
-            "structural steel 235 N/mm²; a body that does not yield is IsotropicElasticity"
-        )
+    require_positive("yield_stress", yield_stress, "235 N/mm² for structural steel, or IsotropicElasticity")
     if not (np.isfinite(back) and back >= 0):
         raise InvalidInputError(
-            f"kinematic_hardening must be a number of at least 0, got {back!r}: give the slope of the "
-            "back stress by plastic strain in tension, in force per area"
+            f"kinematic_hardening must be a number of at least 0, got {back!r}: give the slope of back stress"
         )
     if not (np.isfinite(slope) and slope + back > -young_modulus):
         raise InvalidInputError(
-            f"isotropic_hardening must be a number above −E − kinematic_hardening = "
-            f"{-young_modulus - back:.6g}, got {slope!r}: with less, stress in tension falls faster "
-            "than the bar unloads, and the strain is not unique"
+            f"isotropic_hardening must exceed −E − kinematic_hardening = {-young_modulus - back:.6g}, got "
+            f"{slope!r}: with less the strain is not unique"
         )
     gain, rate = hardening.gain, hardening.rate
     if not (np.isfinite(gain) and gain >= 0 and np.isfinite(rate) and rate >= 0):
         raise InvalidInputError(
-            f"saturation_stress must be a number of at least yield_stress {yield_stress!r} and "
-            f"saturation_rate one of at least 0, got {yield_stress + gain!r} and {rate!r}: give the stress "
-            "at which hardening ends and how fast it is approached, 1/α, or neither"
+            f"saturation_stress must be at least the yield_stress {yield_stress!r} and saturation_rate at "
+            f"least 0, got {yield_stress + gain!r} and {rate!r}: correct them, or leave out both"
         )
 
 

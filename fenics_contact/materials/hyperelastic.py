@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -71,8 +72,7 @@ class EnergyModel(Elasticity):
         if extract_coefficients(moduli) or not self._is_quadratic(dim):
             raise InvalidInputError(
                 f"{type(self).__name__}.energy must be a quadratic function of the strain without linear "
-                "terms, this one is not (or hides it: its second derivative must not mention the strain): "
-                "only small-strain linear elasticity is solved here"
+                "terms: write it so that its second derivative does not contain the strain"
             )
         i, j, k, l = ufl.indices(4)  # noqa: E741
         left = ufl.as_tensor(0.5 * (moduli[i, j, k, l] + moduli[j, i, k, l]), (i, j, k, l))
@@ -456,7 +456,7 @@ class MooneyRivlin(IsotropicRubber):
     def __post_init__(self) -> None:
         """Reject constants for which the energy of small strains is not positive."""
         check_expansion(self.thermal_expansion)
-        _check_moduli("2 (c10 + c01)", 2 * (self.c10 + self.c01), self.bulk_modulus)
+        check_moduli("the shear modulus 2 (c10 + c01)", 2 * (self.c10 + self.c01), self.bulk_modulus)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -504,12 +504,9 @@ class Ogden(IsotropicRubber):
         count = np.size(self.shear_moduli)
         for name in ("shear_moduli", "exponents"):
             object.__setattr__(self, name, numbers(name, getattr(self, name), count, order))
-        if not all(self.exponents):
-            raise InvalidInputError(
-                f"exponents must not be zero, got {self.exponents}: leave out the terms without influence"
-            )
+        check_exponents(self.exponents)
         shear = sum(mu * alpha for mu, alpha in zip(self.shear_moduli, self.exponents, strict=True)) / 2
-        _check_moduli("½ Σ μ_p α_p", shear, self.bulk_modulus)
+        check_moduli("the shear modulus ½ Σ μ_p α_p", shear, self.bulk_modulus)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -528,12 +525,17 @@ class Ogden(IsotropicRubber):
         return parameters[len(self.exponents)] / 2 * (J - 1) ** 2
 
 
-def _check_moduli(name: str, shear_modulus: float, bulk_modulus: float) -> None:
+def check_exponents(exponents: Sequence[float]) -> None:
+    """Reject terms of an energy without influence."""
+    if not all(exponents):
+        raise InvalidInputError(f"exponents must not be zero, got {exponents}: leave out such terms")
+
+
+def check_moduli(name: str, shear: float, bulk: float) -> None:
     """Reject moduli of small strains that are not positive."""
-    if not min(shear_modulus, bulk_modulus) > 0 or not np.isfinite([shear_modulus, bulk_modulus]).all():
+    if not min(shear, bulk) > 0 or not np.isfinite([shear, bulk]).all():
         raise InvalidInputError(
-            f"the moduli of small strains must be positive numbers, got the shear modulus {name} = "
-            f"{shear_modulus:g} and bulk_modulus {bulk_modulus:g}: give constants in force per area"
+            f"{name} and the bulk modulus must be positive, got {shear:g} and {bulk:g}: give force per area"
         )
 
 

@@ -19,6 +19,7 @@ from fenics_contact.materials.elastic import (
     check_thickness,
     checked_stiffness,
     numbers,
+    require_positive,
     rotated_stiffness,
     strain,
     strain_vector,
@@ -49,8 +50,7 @@ def material_axes(first: Sequence[float], second: Sequence[float]) -> tuple[Trip
     normal = np.cross(a, b)
     if not np.linalg.norm(normal) > 1e-8 * np.linalg.norm(a) * np.linalg.norm(b):
         raise InvalidInputError(
-            f"two material axes must span a plane, got {first!r} and {second!r}, which are parallel or zero: "
-            "give two directions that differ"
+            f"material axes must not be parallel or zero, got {first!r} and {second!r}: give others"
         )
     a, c = a / np.linalg.norm(a), normal / np.linalg.norm(normal)
     x, y, z = ((float(v[0]), float(v[1]), float(v[2])) for v in (a, np.cross(c, a), c))
@@ -88,11 +88,8 @@ class OrthotropicElasticity(SpatialElasticity):
         if self.thermal_expansion is not None:
             values = numbers("thermal_expansion", self.thermal_expansion, 3, order)
             object.__setattr__(self, "thermal_expansion", values)
-        if min(*self.young_moduli, *self.shear_moduli) <= 0:
-            raise InvalidInputError(
-                f"young_moduli and shear_moduli must be positive, got {self.young_moduli!r} and "
-                f"{self.shear_moduli!r}: give them in force per area"
-            )
+        for modulus in (*self.young_moduli, *self.shear_moduli):
+            require_positive("each of young_moduli and shear_moduli", modulus, "give it in force per area")
         object.__setattr__(self, "orientation", checked_axes(self.orientation))
         _ = self.stiffness_matrix
 
@@ -143,9 +140,8 @@ class OrthotropicPlaneStress(Plate):
         others = (self.poisson_ratio, self.shear_modulus, self.angle)
         if not np.isfinite(others).all() or min(*moduli, self.shear_modulus) <= 0:
             raise InvalidInputError(
-                "OrthotropicPlaneStress needs finite constants with positive moduli, got young_moduli "
-                f"{moduli}, poisson_ratio {self.poisson_ratio!r}, shear_modulus {self.shear_modulus!r}, "
-                f"angle {self.angle!r}: give moduli in force per area and the angle in radians"
+                "OrthotropicPlaneStress needs finite constants and positive moduli, got young_moduli "
+                f"{moduli} and (poisson_ratio, shear_modulus, angle) {others}: correct them"
             )
         check_thickness(self.thickness)
         _ = self.stiffness_matrix

@@ -108,8 +108,7 @@ class HistoryMaterial(Elasticity):
         super().__init_subclass__(**given)
         if "answer" in vars(cls):
             raise InvalidInputError(
-                f"a material with a history must define respond, {cls.__name__} defines answer, which checks "
-                "what respond returns: rename it, and call super().respond there"
+                f"{cls.__name__} must define respond, not answer, which checks respond: rename it"
             )
 
     @property
@@ -173,24 +172,17 @@ class HistoryMaterial(Elasticity):
         for part, shape in shapes.items():
             if arrays[part].shape != shape:
                 raise InvalidInputError(
-                    f"respond of {name} must return {part} of shape {shape} for {n} points and "
-                    f"{self.history_size} internal variables, got {arrays[part].shape}: return a "
-                    "MaterialResponse(stress, tangent, history) with one row per point"
+                    f"respond of {name} must return {part} of shape {shape}, got {arrays[part].shape}"
                 )
         if np.isnan(duration) and not np.isfinite(arrays["stress"]).any():
-            raise InvalidInputError(
-                f"the answer of {name} depends on the duration of the step, none was given: give it, or use "
-                "a material that does not depend on it"
-            )
+            raise InvalidInputError(f"{name} needs the duration of the step, got none: give one")
         upright = np.linalg.det(np.eye(3) + gradient) > 0 if self.finite else np.ones(n, dtype=bool)
         for part, values in arrays.items():
             bad = ~np.isfinite(values.reshape(n, -1)).all(axis=1) & upright
             if bad.any():
                 raise InvalidInputError(
-                    f"respond of {name} must return finite numbers, {part} has NaN or infinity at "
-                    f"{bad.sum()} of {n} points, first for the displacement gradient "
-                    f"{np.array2string(gradient[bad][0], precision=3, separator=', ')}: check the constants "
-                    "and guard divisions by zero"
+                    f"respond of {name} must return finite numbers, {part} is not at {bad.sum()} of {n}, "
+                    f"first at H = {np.array2string(gradient[bad][0], precision=3, separator=', ')}: check it"
                 )
         return MaterialResponse(**arrays)
 
@@ -210,15 +202,12 @@ class HistoryMaterial(Elasticity):
         unsymmetric = max(np.abs(each).max() for each in swapped)
         if np.abs(first.stress).max() > 1e-10 * size:
             raise InvalidInputError(
-                f"{name} must have no stress at zero displacement and history, got "
-                f"{np.abs(first.stress).max():.3g}: choose internal variables that are zero in the "
-                "unloaded body"
+                f"{name} must have no stress at rest, got {np.abs(first.stress).max():.3g}: use zero history"
             )
         if unsymmetric > 1e-10 * size:
             raise InvalidInputError(
-                f"the tangent of {name} at zero displacement and history must be that of linear elasticity, "
-                f"it misses C_ijkl = C_klij = C_jikl by {unsymmetric / size:.1e} of its largest entry: check "
-                "the order of its indices, [point, i, j, k, l] is dP_ij / dH_kl"
+                f"the tangent of {name} at rest must satisfy C_ijkl = C_klij = C_jikl, but misses it by "
+                f"{unsymmetric / size:.1e}: check its order, [point, i, j, k, l] is dP_ij / dH_kl"
             )
         return C
 
@@ -288,15 +277,14 @@ class VonMisesMetal(HistoryMaterial):
         if (self.saturation_stress is None) != (self.saturation_rate == 0.0):
             raise InvalidInputError(
                 "saturation_stress and saturation_rate must be given together, got "
-                f"{self.saturation_stress!r} and {self.saturation_rate!r}: one alone has no effect"
+                f"{self.saturation_stress!r} and {self.saturation_rate!r}: give both or neither"
             )
 
     def _require_one(self, curve: str, others: tuple[str, ...]) -> None:
         given = [name for name in others if getattr(self, name)]
         if getattr(self, curve) and given:
             raise InvalidInputError(
-                f"a {curve} is all of that hardening, got {given[0]} = {getattr(self, given[0])!r} beside "
-                "it: give one of them"
+                f"{curve} must be all of that hardening, got {given[0]} as well: give one of them"
             )
 
     @property

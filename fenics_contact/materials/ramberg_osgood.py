@@ -59,9 +59,8 @@ class RambergOsgood(HistoryMaterial):
             np.isfinite(numbers).all() and self.yield_stress > 0 and self.exponent >= 1 and self.offset >= 0
         ):
             raise InvalidInputError(
-                "RambergOsgood needs a yield_stress above 0, an exponent of at least 1 and an offset of at "
-                f"least 0, got {self.yield_stress!r}, {self.exponent!r} and {self.offset!r}: give σ_0, n and "
-                "a of E ε = σ + a σ (σ / σ_0)^(n − 1)"
+                f"yield_stress > 0, exponent >= 1 and offset >= 0 are needed, got {self.yield_stress!r}, "
+                f"{self.exponent!r}, {self.offset!r}: give σ_0, n, a of E ε = σ + a σ (σ / σ_0)^(n − 1)"
             )
 
     @property

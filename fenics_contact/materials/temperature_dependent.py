@@ -70,9 +70,7 @@ class TemperatureDependentElasticity(HistoryMaterial):
                 check_isotropic(young, poisson, None)
         for name in ("initial_temperature", "expansion_from"):
             if not np.isfinite(getattr(self, name)):
-                raise InvalidInputError(
-                    f"{name} must be a finite number, got {getattr(self, name)!r}: give it in degrees"
-                )
+                raise InvalidInputError(f"{name} must be finite, got {getattr(self, name)!r}: give degrees")
 
     @property
     def at_rest(self) -> tuple[float, float]:
@@ -123,8 +121,7 @@ def _table(name: str, given: ByTemperature) -> ByTemperature:
     good = pairs.ndim == 2 and pairs.shape[1:] == (2,) and len(pairs) and np.isfinite(pairs).all()
     if not good or (np.diff(pairs[:, 0]) <= 0).any():
         raise InvalidInputError(
-            f"{name} must be a finite number, or pairs of a temperature and a value with ascending "
-            f"temperatures, got {given!r}: give it such as ((20.0, 2.1e5), (500.0, 1.3e5))"
+            f"{name} must be a finite number, or pairs with ascending temperatures, got {given!r}: correct it"
         )
     return tuple((float(temperature), float(value)) for temperature, value in pairs)
 

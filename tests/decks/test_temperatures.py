@@ -87,7 +87,7 @@ HOT = step("*TEMPERATURE\nALL, 220.\n")
             heated(SOFTENING, HOT).replace("ALL, 120.\n", "ALL, 120.\nBAR_X0, 20.\n"),
             r"depend on the temperature are not supported with several initial temperatures",
         ),
-        (heated(SOFTENING.replace("520.", "20."), HOT), r"pairs of a temperature and a value with ascending"),
+        (heated(SOFTENING.replace("520.", "20."), HOT), r"or pairs with ascending temperatures"),
     ],
     ids=["plane stress", "large", "metal", "initial", "twice"],
 )  # fmt: skip

@@ -305,10 +305,12 @@ def test_a_material_must_suit_the_dimension_of_the_mesh() -> None:
 
 def test_orthotropic_constants_must_give_a_positive_energy() -> None:
     with pytest.raises(
-        InvalidInputError, match=r"must give a positive energy, young_moduli .* reduce the Poisson"
+        InvalidInputError, match=r"young_moduli .* give no positive energy: reduce the Poisson"
     ):
         OrthotropicElasticity((1.0, 1.0, 1.0), (0.6, 0.6, 0.6), (1.0, 1.0, 1.0))
-    with pytest.raises(InvalidInputError, match=r"young_moduli and shear_moduli must be positive, got"):
+    with pytest.raises(
+        InvalidInputError, match=r"young_moduli and shear_moduli must be a positive number, got -1"
+    ):
         OrthotropicElasticity((1.0, -1.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0))
     with pytest.raises(
         InvalidInputError, match=r"young_moduli must be 3 finite numbers, got .*: give those of the"
@@ -326,19 +328,17 @@ def test_moduli_of_an_anisotropic_body_must_be_symmetric_and_give_a_positive_ene
     one_sided[1, 3] = 0.3
     negative[2, 2] = -1.0
     indefinite[4, 5] = indefinite[5, 4] = 1.2
-    with pytest.raises(InvalidInputError, match=r"symmetric, got 0.3 in row 2, column 4 and 0.1 in row 4"):
+    with pytest.raises(InvalidInputError, match=r"symmetric, got \[1\]\[3\] = 0.3, \[3\]\[1\] = 0.1"):
         crystal(one_sided)
     for bad in (negative, indefinite, np.zeros((6, 6))):
-        with pytest.raises(InvalidInputError, match=r"moduli must give a positive energy, the smallest"):
+        with pytest.raises(InvalidInputError, match=r"moduli must give a positive energy, a scaled"):
             crystal(bad)
-    with pytest.raises(InvalidInputError, match=r"moduli must be six rows of six finite numbers"):
+    with pytest.raises(InvalidInputError, match=r"moduli must be 6 x 6 finite numbers"):
         crystal(np.eye(5))
 
 
 def test_an_orientation_must_be_a_rotation() -> None:
-    with pytest.raises(
-        InvalidInputError, match=r"orientation must hold three orthonormal material axes as rows"
-    ):
+    with pytest.raises(InvalidInputError, match=r"orientation must be three orthonormal rows, got"):
         OrthotropicElasticity((1.0,) * 3, (0.1,) * 3, (1.0,) * 3, ((1, 0, 0), (0, 1, 0), (0, 0, 2)))
 
 

@@ -135,12 +135,12 @@ def test_two_hot_blocks_press_on_each_other_across_meshes_that_do_not_match() ->
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"young_modulus": ((20.0, 1.0), (20.0, 2.0))}, "pairs of a temperature and a value with ascending"),
+        ({"young_modulus": ((20.0, 1.0), (20.0, 2.0))}, "or pairs with ascending temperatures"),
         ({"young_modulus": "steel"}, "young_modulus must be a finite number, or pairs"),
         ({"young_modulus": ((20.0, 1.0), (40.0, -2.0))}, "young_modulus must be a positive number, got -2"),
         ({"poisson_ratio": ((20.0, 0.5),)}, "poisson_ratio must lie between -1 and 0.5"),
         ({"mean_expansion": (1.0, 2.0)}, "mean_expansion must be a finite number, or pairs"),
-        ({"initial_temperature": np.inf}, "initial_temperature must be a finite number, got inf"),
+        ({"initial_temperature": np.inf}, "initial_temperature must be finite, got inf"),
     ],
 )
 def test_tables_that_are_none_are_refused(given: dict[str, Any], message: str) -> None:

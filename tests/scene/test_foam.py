@@ -54,7 +54,7 @@ def test_stress_and_tangent_are_derivatives_of_the_energy(cell: str) -> None:
     [
         (((1.0,), (0.0,), (0.1,)), "exponents must not be zero"),
         (((1.0,), (2.0,), (0.5,)), "poisson_ratios must lie between 0 and 0.5"),
-        (((-1.0,), (2.0,), (0.1,)), "the moduli of small strains must be positive"),
+        (((-1.0,), (2.0,), (0.1,)), "the shear modulus Σ μ_p and the bulk modulus must be positive, got -1"),
         (((1.0, 2.0), (2.0,), (0.1,)), "exponents must be 2 finite numbers"),
     ],
 )

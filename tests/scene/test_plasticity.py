@@ -183,15 +183,15 @@ def test_turned_inside_out_there_is_no_stress() -> None:
     [
         ({"yield_stress": 0.0}, "yield_stress must be a positive number, got 0.0"),
         ({"yield_stress": np.inf}, "yield_stress must be a positive number"),
-        ({"isotropic_hardening": -E}, r"isotropic_hardening must be a number above .*= -200000, got"),
+        ({"isotropic_hardening": -E}, r"isotropic_hardening must exceed .*= -200000, got"),
         ({"kinematic_hardening": -1.0}, "kinematic_hardening must be a number of at least 0"),
-        ({"saturation_stress": 100.0}, "saturation_stress must be a number of at least yield_stress 200.0"),
-        ({"saturation_rate": -1.0}, "saturation_rate one of at least 0"),
+        ({"saturation_stress": 100.0}, "saturation_stress must be at least the yield_stress 200.0"),
+        ({"saturation_rate": -1.0}, "saturation_rate at least 0"),
         (
             {"saturation_stress": 300.0},
             "saturation_stress and saturation_rate must be given together, got 300",
         ),
-        ({"saturation_rate": 9.0}, "must be given together, got None and 9.0: one alone has no"),
+        ({"saturation_rate": 9.0}, "must be given together, got None and 9.0: give both"),
         ({"young_modulus": -1.0}, "young_modulus must be a positive number"),
         ({"poisson_ratio": 0.5}, "poisson_ratio must lie between"),
     ],
@@ -258,8 +258,8 @@ def test_a_model_of_ones_own_needs_two_members() -> None:
 @pytest.mark.parametrize(
     ("spoilt", "message"),
     [
-        ("stressed", "Kelvin must have no stress at zero displacement and history, got 1"),
-        ("tangent", "the tangent of Kelvin at zero displacement and history must be that of linear"),
+        ("stressed", "Kelvin must have no stress at rest, got 1"),
+        ("tangent", "the tangent of Kelvin at rest must satisfy C_ijkl = C_klij = C_jikl"),
     ],
 )
 def test_a_linear_part_that_is_none_is_refused(spoilt: str, message: str) -> None:
@@ -270,8 +270,8 @@ def test_a_linear_part_that_is_none_is_refused(spoilt: str, message: str) -> Non
 @pytest.mark.parametrize(
     ("spoilt", "message"),
     [
-        ("shape", r"respond of Kelvin must return tangent of shape \(4, 3, 3, 3, 3\) for 4 points and 6"),
-        ("infinite", "respond of Kelvin must return finite numbers, stress has NaN or infinity at 1 of 4"),
+        ("shape", r"respond of Kelvin must return tangent of shape \(4, 3, 3, 3, 3\), got \(3, 3, 3, 3\)"),
+        ("infinite", "respond of Kelvin must return finite numbers, stress is not at 1 of 4"),
     ],
 )
 def test_answers_of_another_form_are_refused(spoilt: str, message: str) -> None:
@@ -291,7 +291,7 @@ def test_the_linear_part_is_elastic() -> None:
 
 
 def test_a_model_that_replaces_the_checks_of_its_answer_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match="must define respond, Hasty defines answer, which checks"):
+    with pytest.raises(InvalidInputError, match="Hasty must define respond, not answer, which checks"):
 
         class Hasty(J2Plasticity):
             def answer(self, *given: Any) -> Any:
@@ -377,24 +377,24 @@ def test_one_slope_is_the_same_in_words_and_as_a_curve() -> None:
     [
         (
             {"hardening_curve": ((0.0, 250.0),)},
-            r"the plastic strains of hardening_curve must ascend from above",
+            r"hardening_curve must have ascending strains above 0",
         ),
-        ({"hardening_curve": ((0.2, 250.0), (0.1, 300.0))}, r"hardening_curve must ascend"),
-        ({"hardening_curve": ((0.2, -1.0),)}, r"its stresses be at least zero"),
+        ({"hardening_curve": ((0.2, 250.0), (0.1, 300.0))}, r"hardening_curve must have ascending strains"),
+        ({"hardening_curve": ((0.2, -1.0),)}, r"and no negative stress"),
         (
             {"hardening_curve": (0.2, 250.0)},
-            r"hardening_curve must be pairs of a plastic strain and a stress",
+            r"hardening_curve must be pairs \(plastic strain, stress\)",
         ),
         (
             {"hardening_curve": ((0.2, 300.0),), "isotropic_hardening": 1.0},
-            r"got isotropic_hardening = 1.0 b",
+            r"got isotropic_hardening as well",
         ),
-        ({"kinematic_curve": ((0.2, 30.0),), "kinematic_hardening": 1.0}, r"got kinematic_hardening = 1.0 b"),
+        ({"kinematic_curve": ((0.2, 30.0),), "kinematic_hardening": 1.0}, r"got kinematic_hardening as well"),
         (
             {"kinematic_curve": ((0.1, 30.0), (0.2, 20.0))},
             r"kinematic_hardening must be a number of at least",
         ),
-        ({"hardening_curve": ((1e-4, 100.0),)}, r"must be a number above −E"),
+        ({"hardening_curve": ((1e-4, 100.0),)}, r"isotropic_hardening must exceed −E"),
     ],
 )
 def test_curves_that_say_no_hardening_are_refused(given: dict[str, Any], message: str) -> None:

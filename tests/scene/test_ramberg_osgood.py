@@ -55,5 +55,5 @@ def test_it_turns_with_the_body_and_is_hookes_law_in_the_small() -> None:
 
 @pytest.mark.parametrize("wrong", [{"yield_stress": 0.0}, {"exponent": 0.5}, {"offset": -1.0}])
 def test_constants_without_a_unique_stress_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InvalidInputError, match="RambergOsgood needs a yield_stress above 0"):
+    with pytest.raises(InvalidInputError, match="yield_stress > 0, exponent >= 1 and offset >= 0 are needed"):
         replace(METAL, **wrong)
