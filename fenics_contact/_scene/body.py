@@ -16,10 +16,11 @@ from fenics_contact._kinematics.element import Element
 from fenics_contact._kinematics.integration import integration_of
 from fenics_contact._kinematics.revolution import Revolution
 from fenics_contact._kinematics.torsion import Torsion
+from fenics_contact._scene.effects import EffectName
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material, thickness_of
-from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain
+from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain, is_nonlinear
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES
@@ -56,6 +57,8 @@ class Body:
         >>> ring = Body(half_section, IsotropicElasticity(2.1e5, 0.3), axisymmetric=True)
     """
 
+    effect = EffectName.ELASTICITY
+    is_rigid = False
     mesh: BodyMesh
     material: Material | Mapping[str, Material]
     axisymmetric: bool = False
@@ -154,6 +157,16 @@ class Body:
     def deforms_much(self) -> bool:
         """Whether one of the materials is made for large deformations, rotations included."""
         return any(map(is_finite_strain, self.materials))
+
+    @property
+    def effects(self) -> tuple[EffectName, ...]:
+        """The physical effects that it calls for."""
+        more = {
+            EffectName.AXISYMMETRY: self.axisymmetric,
+            EffectName.TORSION: self.torsion,
+            EffectName.NONLINEAR_MATERIAL: any(map(is_nonlinear, self.materials)),
+        }
+        return self.effect, *(name for name, given in more.items() if given)
 
     @property
     def in_words(self) -> str:

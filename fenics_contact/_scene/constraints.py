@@ -12,6 +12,8 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.checks import GivenVector, brief, checked, floats
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.effects import EffectName
+from fenics_contact._scene.part import Around, Part, body_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 
@@ -139,7 +141,7 @@ class ConstraintTerm:
 @displayed
 @dataclass(frozen=True)
 @checked("value")
-class LinearConstraint:
+class LinearConstraint(Part):
     """Equations Σ c d·u = b between displacements of nodes, of one or several bodies.
 
     They hold exactly, as rows of multipliers, and stay linear in the displacements where bodies deform much.
@@ -165,6 +167,7 @@ class LinearConstraint:
         >>> periodic = LinearConstraint(sides, value=0.01, paired="translation", name="shear")
     """
 
+    effect = EffectName.LINEAR_CONSTRAINT
     terms: Sequence[ConstraintTerm]
     value: float | Sequence[float] = 0.0
     name: str = ""
@@ -176,6 +179,22 @@ class LinearConstraint:
             raise InvalidInputError("a LinearConstraint needs terms, got none: give at least one")
         object.__setattr__(self, "terms", tuple(self.terms))
         object.__setattr__(self, "value", _values(self.value, self.label))
+
+    def check(self, scene: Around) -> None:
+        """Reject terms of what is not there, and those that do not fit each other or their bodies."""
+        if any(body.torsion for body in scene.bodies.values()):
+            raise InvalidInputError(
+                "scenes with torsion have no linear constraints, got some: leave the torsion or these out"
+            )
+        for term in self.terms:
+            mesh = body_of(scene, term.body, "ConstraintTerm").mesh
+            known = [*mesh.surfaces, *mesh.node_sets]
+            if isinstance(term.nodes, str) and term.nodes not in known:
+                raise InvalidInputError(
+                    f"ConstraintTerm names nodes {term.nodes!r} of body {term.body!r}, which has "
+                    f"{sorted(known)}: use one of them, or numbers"
+                )
+        self.entries(scene.bodies)
 
     @property
     def label(self) -> str:
@@ -295,28 +314,6 @@ def _values(value: float | Sequence[float], label: str) -> float | GivenVector:
             f"{brief(value)}: give [length] where factors have no unit"
         )
     return floats(numbers) if numbers.ndim else float(numbers)
-
-
-def require_terms(constraints: Sequence[LinearConstraint], bodies: Mapping[str, Body]) -> None:
-    """Reject terms of what is not there, and those that do not fit each other or their bodies."""
-    if constraints and any(body.torsion for body in bodies.values()):
-        raise InvalidInputError(
-            "scenes with torsion have no linear constraints, got some: leave the torsion or these out"
-        )
-    for each in constraints:
-        for term in each.terms:
-            if term.body not in bodies:
-                raise InvalidInputError(
-                    f"ConstraintTerm names body {term.body!r}, the scene has {sorted(bodies)}: name one"
-                )
-            mesh = bodies[term.body].mesh
-            known = [*mesh.surfaces, *mesh.node_sets]
-            if isinstance(term.nodes, str) and term.nodes not in known:
-                raise InvalidInputError(
-                    f"ConstraintTerm names nodes {term.nodes!r} of body {term.body!r}, which has "
-                    f"{sorted(known)}: use one of them, or numbers"
-                )
-        each.entries(bodies)
 
 
 def with_values(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats
+from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.part import Around, Part, require_surface
 from fenics_contact.errors import InvalidInputError
 
@@ -34,6 +35,7 @@ class ElasticFoundation(Part):
         >>> mount = ElasticFoundation("engine", "foot", (200.0, 200.0, 900.0), total=True)  # N/mm
     """
 
+    effect = EffectName.FOUNDATION
     body: str
     surface: str
     stiffness: float | GivenVector

@@ -17,6 +17,7 @@ import numpy as np
 from fenics_contact._base.checks import GivenVector, check_row, checked, floats, naming_arguments, unit_vector
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import (
     ScalarValue,
     Ufl,
@@ -48,6 +49,7 @@ class Traction(Part):
         >>> rising = Traction("block", "z1", lambda x: -10.0 * x[:, :1] * (0.0, 0.0, 1.0))
     """
 
+    effect = EffectName.SURFACE_LOAD
     body: str
     surface: str
     value: VectorValue
@@ -87,6 +89,7 @@ class TotalForce(Part):
         >>> eccentric = TotalForce("bracket", "plate", (0.0, 0.0, -500.0), at=(40.0, 0.0, 10.0))
     """
 
+    effect = EffectName.SURFACE_LOAD
     body: str
     surface: str
     value: GivenVector
@@ -170,6 +173,7 @@ class Pressure(Part):
         >>> weight_of_snow = Pressure("membrane", "top", 1e-3, dead=True)
     """
 
+    effect = EffectName.SURFACE_LOAD
     body: str
     surface: str
     value: ScalarValue
@@ -178,6 +182,14 @@ class Pressure(Part):
     def __post_init__(self) -> None:
         """Reject a value that is not a scalar."""
         object.__setattr__(self, "value", checked_scalar("Pressure.value", self.value))
+
+    def effects(self, scene: Around) -> tuple[EffectName, ...]:
+        """Return that of a load on a surface, and whether it follows that."""
+        return self.effect, *(EffectName.FOLLOWING_PRESSURE for _ in self.following(scene))
+
+    def following(self, scene: Around) -> tuple[Pressure, ...]:
+        """Return it if it follows its surface, as on bodies that deform much, else nothing."""
+        return (self,) if scene.bodies[self.body].deforms_much and not self.dead else ()
 
     def check(self, scene: Around) -> None:
         """Reject a surface without an area."""
@@ -196,6 +208,7 @@ class BodyForce(Part):
         region: Name of the region of its mesh that is loaded; all of the body by default.
     """
 
+    effect = EffectName.BODY_FORCE
     body: str
     value: VectorValue
     region: str | None = None
@@ -236,6 +249,7 @@ class ThermalStrain(Part):
             are nonlinear.
     """
 
+    effect = EffectName.THERMAL_STRAIN
     body: str
     temperature_change: ScalarValue
 
@@ -282,6 +296,7 @@ class InitialStress(Part):
         >>> rolled = InitialStress("bar", lambda x: np.outer(x[:, 2] ** 2 - 8.3, (12.0, 0, 0, 0, 0, 0)))
     """
 
+    effect = EffectName.INITIAL_STRESS
     body: str
     value: VectorValue
     region: str | None = None
@@ -360,6 +375,7 @@ class PointForce(Part):
         >>> tip = PointForce("beam", "tip", (0.0, 0.0, -100.0))  # N
     """
 
+    effect = EffectName.POINT_FORCE
     body: str
     nodes: str
     value: VectorValue

@@ -12,6 +12,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact._base.display import Table, in_notebooks, in_short, name_in_words, tabled
 from fenics_contact._base.late_names import warn_of_old_name
 from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
+from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
@@ -75,6 +76,7 @@ class Coulomb:
         >>> dry = Coulomb(FrictionTable(pressure=(0.0, 100.0), coefficient=(0.3, 0.2)))
     """
 
+    effect = EffectName.COULOMB
     friction_coefficient: float | OfPosition | FrictionCurve | SlipTable
     shear_limit: float | OfPosition | None = None
     stick_stiffness: float | None = None
@@ -114,6 +116,7 @@ class Tresca:
             length³]: before it slips it gives way elastically, and springs back. None: it does not move.
     """
 
+    effect = EffectName.TRESCA
     traction: float | OfPosition
     stick_stiffness: float | None = None
 
@@ -180,6 +183,7 @@ class ContactPair(Chosen, Part):
         True
     """
 
+    effect = EffectName.CONTACT
     slave: Surface
     master: Surface | RigidObstacle
     friction: Friction = None
@@ -216,6 +220,18 @@ class ContactPair(Chosen, Part):
                 f"contact of the nodes of {self.nodes!r} alone is by nodes and between two bodies, got "
                 f"{given}: leave the nodes out, or give no discretisation and a master of another body"
             )
+
+    def effects(self, scene: Around) -> tuple[EffectName, ...]:
+        """Return contact, and what its laws call for."""
+        curved = self.friction_curve, self.slip_table, self.shear_limit
+        laws = {
+            EffectName.CLOSURE: self.closure is not None,
+            EffectName.FLUID: self.fluid is not None,
+            EffectName.FRICTION_CURVE: any(each is not None for each in curved),
+        }
+        if self.friction is not None and self.has_friction:
+            laws |= {self.friction.effect: True, EffectName.STICK_STIFFNESS: self.stick_stiffness is not None}
+        return self.effect, *(name for name, given in laws.items() if given)
 
     def check(self, scene: Around) -> None:
         """Reject surfaces that are not there, and what does not suit the bodies."""
@@ -408,6 +424,7 @@ class Tie(Chosen, Part):
         choice: As in `ContactPair`.
     """
 
+    effect = EffectName.TIE
     slave: Surface
     master: Surface
     sliding: bool = False

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
+from fenics_contact._scene.effects import EffectName
 from fenics_contact.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -34,7 +35,13 @@ class Around(Protocol):
 
 
 class Part:
-    """A load, a support, a pair or another part: the scene asks all of them alike."""
+    """A load, a support, a pair or another part: the scene asks all of them alike.
+
+    Attributes:
+        effect: The physical effect that it calls for.
+    """
+
+    effect: ClassVar[EffectName]
 
     def check(self, scene: Around) -> None:
         """Reject a part that does not suit the bodies of its scene."""
@@ -42,6 +49,10 @@ class Part:
     def in_scene(self, scene: Around) -> Self:
         """Return the part as its scene holds it, with all that follows from the kinematics."""
         return self
+
+    def effects(self, scene: Around) -> tuple[EffectName, ...]:
+        """Return the physical effects that the part calls for."""
+        return (self.effect,)
 
 
 def body_of(scene: Around, name: str, user: str) -> Body:

@@ -70,7 +70,7 @@ class SceneParts:
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "supports", supports)
         self._require_one_dimension()
-        for part in self._parts:
+        for part in self._checked_parts:
             part.check(self)
         for name in ("supports", "loads"):
             object.__setattr__(self, name, tuple(part.in_scene(self) for part in getattr(self, name)))
@@ -88,10 +88,15 @@ class SceneParts:
             require_simple_torsion(self.bodies.values(), self.supports, others)
 
     @property
-    def _parts(self) -> Iterator[Part]:
-        """All parts that act on bodies or join them."""
+    def _checked_parts(self) -> Iterator[Part]:
+        """The parts that are checked before meshes are cut: all but those that may name nodes of cuts."""
         yield from (*self.supports, *self.loads, *self.preloads, *self.foundations, *self.springs)
         yield from (*self.contacts, *self.ties)
+
+    @property
+    def parts(self) -> Iterator[Part]:
+        """All parts that act on bodies or join them."""
+        yield from (*self._checked_parts, *self.constraints)
 
     @property
     def deforms_much(self) -> bool:

@@ -6,19 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._scene.discretisation import in_words
-from fenics_contact._scene.loads import BodyForce, PointForce, ThermalStrain
+from fenics_contact._scene.effects import Effect, EffectName, listed
 from fenics_contact._scene.memory import Subdomains, expected_memory
-from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tresca
-from fenics_contact._scene.supports import RigidSurface, Roller
-from fenics_contact._scene.tools import ToolBody, with_tool_parts
+from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.supports import RigidSurface
+from fenics_contact._scene.tools import with_tool_parts
 from fenics_contact._surfaces.facets import has_midside_pressure
-from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import pieces
 from fenics_contact.mesh.faces import of_one_shape
@@ -29,99 +29,10 @@ if TYPE_CHECKING:
     from fenics_contact._scene.preloads import Preload
 
 
-class EffectName(StrEnum):
-    """The effects that a scene can contain."""
-
-    ELASTICITY = "elasticity"
-    AXISYMMETRY = "axisymmetry"
-    TORSION = "torsion"
-    NONLINEAR_MATERIAL = "nonlinear material"
-    PRESCRIBED_DISPLACEMENT = "prescribed displacement"
-    ROLLER = "roller"
-    RIGID_SURFACE = "rigid surface"
-    FOUNDATION = "elastic foundation"
-    SPRING = "spring"
-    LINEAR_CONSTRAINT = "linear constraint"
-    RIGID_TOOL = "rigid tool"
-    BODY_FORCE = "body force"
-    SURFACE_LOAD = "surface load"
-    POINT_FORCE = "force at nodes"
-    FOLLOWING_PRESSURE = "following pressure"
-    THERMAL_STRAIN = "thermal strain"
-    TIE = "tied surfaces"
-    CYCLIC_SYMMETRY = "cyclic symmetry"
-    PRELOAD = "bolt preload"
-    CONTACT = "contact"
-    CLOSURE = "surfaces that give way"
-    STICK_STIFFNESS = "elastic slip"
-    FLUID = "fluid that enters where contact opens"
-    TRESCA = "Tresca friction"
-    COULOMB = "Coulomb friction"
-    FRICTION_CURVE = "friction that pressure limits or changes"
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One physical effect in a scene, and the reason for it."""
-
-    name: EffectName
-    reason: str
-
-
 def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     """List the effects in a scene, in the order of `EffectName`."""
-    names, loads = EffectName, scene.loads
-    turned = sum(body.axisymmetric for body in scene.bodies.values())
-    nonlinear = sum(any(map(is_nonlinear, body.materials)) for body in scene.bodies.values())
-    tools = sum(isinstance(body, ToolBody) for body in scene.bodies.values())
-    rigid, rolling = (sum(isinstance(s, kind) for s in scene.supports) for kind in (RigidSurface, Roller))
-    held, rigid = len(scene.supports) - rigid - rolling, rigid - tools
-    volume = sum(isinstance(load, BodyForce) for load in loads)
-    thermal, single = (sum(isinstance(load, k) for load in loads) for k in (ThermalStrain, PointForce))
-    rubbing = [pair.friction for pair in scene.contacts if pair.has_friction]
-    tresca, coulomb = (sum(isinstance(law, kind) for law in rubbing) for kind in (Tresca, Coulomb))
-    wetted = sum(pair.fluid is not None for pair in scene.contacts)
-    sprung = sum(pair.has_friction and pair.stick_stiffness is not None for pair in scene.contacts)
-    soft = sum(pair.closure is not None for pair in scene.contacts)
-    by_slip = sum(pair.slip_table is not None for pair in scene.contacts)
-    curved = by_slip + sum(
-        pair.friction_curve is not None or pair.shear_limit is not None for pair in scene.contacts
-    )
-    fixed, rough = "has a fixed slip bound", "has a friction coefficient above zero"
-    found = (
-        (names.ELASTICITY, len(scene.bodies) - tools, "elastic body", "elastic bodies"),
-        (names.AXISYMMETRY, turned, "body of revolution, all per revolution",
-         "bodies of revolution, all per revolution"),
-        (names.TORSION, sum(body.torsion for body in scene.bodies.values()), "body may twist about its axis",
-         "bodies may twist about their axis"),
-        (names.NONLINEAR_MATERIAL, nonlinear, "body deforms much or yields", "bodies do"),
-        (names.PRESCRIBED_DISPLACEMENT, held, "support", "supports"),
-        (names.ROLLER, rolling, "surface slides", "surfaces slide"),
-        (names.RIGID_SURFACE, rigid, "surface stays rigid", "surfaces stay rigid"),
-        (names.FOUNDATION, len(scene.foundations), "surface rests on springs", "surfaces rest on springs"),
-        (names.SPRING, len(scene.springs), "spring acts between surfaces", "springs act between surfaces"),
-        (names.LINEAR_CONSTRAINT, len(scene.constraints), "set of equations between displacements of nodes",
-         "sets of equations between displacements of nodes"),
-        (names.RIGID_TOOL, tools, "tool moves as one piece", "tools move as one piece each"),
-        (names.BODY_FORCE, volume, "load on a volume", "loads on volumes"),
-        (names.SURFACE_LOAD, len(loads) - volume - thermal - single, "load on a surface",
-         "loads on surfaces"),
-        (names.POINT_FORCE, single, "set of nodes is loaded", "sets of nodes are"),
-        (names.FOLLOWING_PRESSURE, len(scene.following_pressures), "pressure follows its surface",
-         "pressures follow their surfaces"),
-        (names.THERMAL_STRAIN, thermal, "change of temperature", "temperatures"),
-        (names.TIE, len(scene.ties) - len(scene.sectors), "pair stays together", "pairs stay together"),
-        (names.CYCLIC_SYMMETRY, len(scene.sectors), "sector repeats", "sectors repeat"),
-        (names.PRELOAD, len(scene.preloads), "section is drawn together", "sections are drawn together"),
-        (names.CONTACT, len(scene.contacts), "pair may touch", "pairs may touch"),
-        (names.CLOSURE, soft, "pair has a law of closure", "pairs have one"),
-        (names.FLUID, wetted, "pair is a seal", "pairs are seals"),
-        (names.STICK_STIFFNESS, sprung, "pair has a stick stiffness", "pairs have one"),
-        (names.TRESCA, tresca, f"pair {fixed}", f"pairs {fixed.replace('has', 'have')}"),
-        (names.COULOMB, coulomb, f"pair {rough}", f"pairs {rough.replace('has', 'have')}"),
-        (names.FRICTION_CURVE, curved, "pair has a shear limit or a table", "pairs have one"),
-    )  # fmt: skip
-    return tuple(Effect(name, counted(count, *words)) for name, count, *words in found if count)
+    found = (each.effects for each in scene.bodies.values()), (each.effects(scene) for each in scene.parts)
+    return listed(chain.from_iterable(chain(*found)))
 
 
 #: Parts of rigid motions, their resistance and work below this fraction of the largest are rounding.

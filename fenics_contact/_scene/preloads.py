@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._kinematics.measure import PLAIN, Measure
+from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.part import Around, Part, body_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, Cut
@@ -116,6 +117,7 @@ class Preload(Part):
         >>> at_a_partition_face = Preload("bolt", ("shank", "head"), shortening=0.05)  # mm
     """
 
+    effect = EffectName.PRELOAD
     body: str
     section: AnySection
     force: float | None = None

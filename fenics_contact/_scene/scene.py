@@ -11,7 +11,7 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.automatic import AutomaticContact
-from fenics_contact._scene.constraints import require_terms, with_values
+from fenics_contact._scene.constraints import with_values
 from fenics_contact._scene.contact_facets import with_free_centres
 from fenics_contact._scene.discretisation import with_discretisation
 from fenics_contact._scene.loads import Load
@@ -25,7 +25,8 @@ from fenics_contact.errors.kinds import user_code
 from fenics_contact.mesh.bisection import default_partition
 
 if TYPE_CHECKING:
-    from fenics_contact._scene.plan import Effect, Plan
+    from fenics_contact._scene.effects import Effect
+    from fenics_contact._scene.plan import Plan
 
 
 @displayed
@@ -77,7 +78,8 @@ class Scene(SceneParts):
         if self.preloads:
             object.__setattr__(self, "bodies", with_cuts(self))
         require_preloads(self)
-        require_terms(self.constraints, self.bodies)
+        for constraint in self.constraints:
+            constraint.check(self)
         if any(body.mesh.centres for body in self.bodies.values()):
             object.__setattr__(self, "bodies", with_free_centres(self))
         object.__setattr__(self, "contacts", Pairs(with_discretisation(self, self.contacts)))

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
+from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.local_axes import HeldDirections
 from fenics_contact._scene.pairs import AnyDiscretisation, Surface, Tie, place_of
 from fenics_contact._scene.part import Around, Part, require_surface
@@ -48,6 +49,7 @@ class CyclicSymmetry(Chosen, Part):
         >>> sector = CyclicSymmetry(*sides, at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     """
 
+    effect = EffectName.CYCLIC_SYMMETRY
     slave: Surface
     master: Surface
     at: GivenVector

@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.part import Around, Part, require_nodes
 from fenics_contact._surfaces.facets import nodal_areas, surface_moments
@@ -52,6 +53,7 @@ class Spring(Part):
         >>> alike = Spring(Surface("beam", "n5"), Surface("beam", "n28"), (0, 0, float("inf")))  # u_z = w_z
     """
 
+    effect = EffectName.SPRING
     first: Surface
     second: Surface | GivenVector
     stiffness: float | GivenVector

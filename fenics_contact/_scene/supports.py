@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fenics_contact._base.checks import LARGEST, GivenVector, checked, floats, unit_vector
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.local_axes import flat_normal, widest_angle
 from fenics_contact._scene.part import Around, Part, require_nodes, require_vector
@@ -61,6 +62,7 @@ class Support(Part):
         >>> pushed = Support("block", "x1", (0.5, None, None))  # mm
     """
 
+    effect = EffectName.PRESCRIBED_DISPLACEMENT
     body: str
     surface: str
     value: tuple[Component, ...] = (0.0, 0.0, 0.0)
@@ -144,6 +146,7 @@ class Roller(Part):
         >>> round_the_hole = Roller("plate", "bore", displacement=0.02)  # mm, shrinks all around
     """
 
+    effect = EffectName.ROLLER
     body: str
     surface: str
     displacement: float | OfPosition = 0.0
@@ -248,6 +251,7 @@ class RigidSurface(Part):
         >>> loaded = RigidSurface("bracket", "plate", (40, 0, 10), force=(0, 0, -500))  # N
     """
 
+    effect = EffectName.RIGID_SURFACE
     body: str
     surface: str
     at: GivenVector
@@ -274,6 +278,10 @@ class RigidSurface(Part):
                 f"force {self.force!r} and moment {self.moment!r} beside displacement {self.displacement!r} "
                 f"and rotation {self.rotation!r}: leave the component free (None), or the load away"
             )
+
+    def effects(self, scene: Around) -> tuple[EffectName, ...]:
+        """Return that of a rigid surface; a tool is one anyway."""
+        return () if scene.bodies[self.body].is_rigid else (self.effect,)
 
     def check(self, scene: Around) -> None:
         """Reject nodes that are not there, and a point of another space."""

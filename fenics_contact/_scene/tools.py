@@ -10,6 +10,7 @@ import numpy as np
 from fenics_contact._base.checks import GivenVector, checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.supports import TOOL, AnySupport, ToolMotion
@@ -41,6 +42,8 @@ class ToolBody(Body):
         springs: Stiffness along and around the axes, see `ToolMotion.springs`.
     """
 
+    effect = EffectName.RIGID_TOOL
+    is_rigid = True
     tool: RigidTool = field(kw_only=True)
     springs: GivenVector = field(default=(), kw_only=True)
 

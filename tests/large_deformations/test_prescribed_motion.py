@@ -39,7 +39,7 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact._fem.forms import FormLibrary
-from fenics_contact._scene.plan import EffectName
+from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact.errors import InvalidInputError, UserCodeError
