@@ -17,6 +17,8 @@ from fenics_contact.qp.reductions import Vector, global_max, global_sum
 from fenics_contact.qp.resting import LooseMotions
 from fenics_contact.qp.solution import (
     DualSolution,
+    Iterate,
+    SmalseMemory,
     SolverStep,
     Start,
     answer_at,
@@ -175,10 +177,86 @@ def solve(
     problem.check()
     with together(problem.comm):
         under_law = problem.with_law(law or _slip_law(problem, slip_bound, friction_coefficient))
-    same = isinstance(start, DualSolution) and start.problem is problem
     find = _solve_scaled if problem.scaling else _solve_as_given
-    found = _settled(under_law, find(under_law, solver, start, same), solver.tolerance)
+    found = _settled(under_law, find(under_law, solver, _from(start, problem)), solver.tolerance)
     return replace(found, problem=problem)
+
+
+class _Cold:
+    """A start from the shortest multiplier in equilibrium."""
+
+    cold = True
+    memory: SmalseMemory | None = None
+
+    def scaled(self, factor: Vector | float) -> _Cold:
+        return self
+
+    def multiplier(self, problem: DualProblem) -> Vector:
+        return problem.coarse.particular()
+
+    def product(self, problem: DualProblem, operator: CountedOperator, multiplier: Vector) -> Vector:
+        # A cold start is never the answer, and rounding of its product is that of the first step's.
+        return apply_unless_zero(problem, operator, multiplier)
+
+    def iterate(self, problem: DualProblem, multiplier: Vector, product: Vector) -> Iterate:
+        return iterate_fitted(problem, multiplier, product)
+
+
+@dataclass(frozen=True, eq=False)
+class _Warm(_Cold):
+    """A start from a multiplier of another problem, owned."""
+
+    given: Vector
+
+    cold = False
+
+    def scaled(self, factor: Vector | float) -> _Warm:
+        return _Warm(np.asarray(self.given / factor, dtype=np.float64))
+
+    def multiplier(self, problem: DualProblem) -> Vector:
+        return np.array(self.given, dtype=np.float64)
+
+    def product(self, problem: DualProblem, operator: CountedOperator, multiplier: Vector) -> Vector:
+        return apply_unless_zero(problem, operator.exactly, multiplier)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved(_Warm):
+    """A start from a solution."""
+
+    solution: DualSolution
+
+    @property
+    def memory(self) -> SmalseMemory | None:  # type: ignore[override]
+        return self.solution.memory
+
+    @classmethod
+    def at(cls, solution: DualSolution) -> _Solved:
+        return cls(solution.multiplier, solution)
+
+    def scaled(self, factor: Vector | float) -> _Solved:
+        old, s = self.solution, factor
+        scaled = old.multiplier / s, old.product * s, old.residual * s
+        return self.at(replace(old, multiplier=scaled[0], product=scaled[1], residual=scaled[2]))
+
+    def iterate(self, problem: DualProblem, multiplier: Vector, product: Vector) -> Iterate:
+        if self.solution.alpha.shape == (problem.coarse.m,):
+            return iterate_at(problem, multiplier, product, self.solution.alpha)
+        return super().iterate(problem, multiplier, product)
+
+
+class _SolvedBefore(_Solved):
+    """A start from a solution of the same problem, whose product is known."""
+
+    def product(self, problem: DualProblem, operator: CountedOperator, multiplier: Vector) -> Vector:
+        return self.solution.product
+
+
+def _from(start: DualSolution | Vector | None, problem: DualProblem) -> _Cold:
+    """Return a start of a problem."""
+    if isinstance(start, DualSolution):
+        return (_SolvedBefore if start.problem is problem else _Solved).at(start)
+    return _Cold() if start is None else _Warm(start)
 
 
 def _settled(problem: DualProblem, found: DualSolution, tolerance: float) -> DualSolution:
@@ -192,19 +270,17 @@ def _settled(problem: DualProblem, found: DualSolution, tolerance: float) -> Dua
     return replace(found, residual=moved.residual, residuals=moved.residuals, alpha=found.alpha + motion)
 
 
-def _solve_as_given(
-    problem: DualProblem, solver: DualSolver, start: DualSolution | Vector | None, same: bool
-) -> DualSolution:
-    """Solve a problem with its law; ``same``: whether the start is a solution of it. Collective."""
+def _solve_as_given(problem: DualProblem, solver: DualSolver, start: _Cold) -> DualSolution:
+    """Solve a problem with its law. Collective."""
     with Task("solve", unit="products", target=solver.tolerance) as task:
-        if start is None:
+        if start.cold:
             require_equilibrium(problem)
         operator = CountedOperator(
             problem.operator,
             lambda products, residual: task.step(products, measure=residual),
             problem.exact,
         )
-        begin = _begin(problem, operator, start, same)
+        begin = _begin(problem, operator, start)
         answer = _as_it_is(problem, begin, solver.tolerance)
         if answer is not None:
             return replace(answer, released=begin.released)
@@ -243,41 +319,27 @@ def _released(problem: DualProblem, begin: Start, tolerance: float) -> DualSolut
     return None if problem.is_loaded else _as_it_is(problem, _at_rest(problem, begin), tolerance)
 
 
-def _solve_scaled(
-    problem: DualProblem,
-    solver: DualSolver,
-    start: DualSolution | Vector | None,
-    same: bool,
-    attempts: int = 4,
-) -> DualSolution:
+def _solve_scaled(problem: DualProblem, solver: DualSolver, start: _Cold, attempts: int = 4) -> DualSolution:
     """Solve in scaled multipliers until the residuals of the unscaled ones are small, too. Collective."""
     scaled = problem.scaled_problem
     scaled.check()
-    begin = _scaled_start(problem, start)
+    start = start.scaled(problem.scaling.factor)
     tolerance, products = solver.tolerance, 0
     history: tuple[SolverStep, ...] = ()
-    for attempt in range(attempts):
-        begin = _solve_as_given(scaled, solver.with_tolerance(tolerance), begin, same or attempt > 0)
-        products, history = products + begin.products, (*history, *begin.history)
-        solution = _unscaled(problem, begin)
+    for _ in range(attempts):
+        found = _solve_as_given(scaled, solver.with_tolerance(tolerance), start)
+        start = _SolvedBefore.at(found)
+        products, history = products + found.products, (*history, *found.history)
+        solution = _unscaled(problem, found)
         if solution.residuals.within(solver.tolerance):
             return replace(solution, products=products, iterations=len(history), history=history)
         tolerance *= 0.3 * solver.tolerance / solution.residuals.worst
-        tolerance = min(tolerance, 0.3 * begin.residuals.worst or tolerance)  # else nothing is left to do
+        tolerance = min(tolerance, 0.3 * found.residuals.worst or tolerance)  # else nothing is left to do
     raise ConvergenceError(
         f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals} after "
         f"{attempts} attempts with ever stricter scaled ones: loosen the tolerance",
         history,
     )
-
-
-def _scaled_start(problem: DualProblem, start: DualSolution | Vector | None) -> DualSolution | Vector | None:
-    """Return the start for μ, λ = s μ, see `Scaling`."""
-    s = problem.scaling.factor
-    if not isinstance(start, DualSolution):
-        return None if start is None else np.asarray(start / s, dtype=np.float64)
-    multiplier, product, residual = start.multiplier / s, start.product * s, start.residual * s
-    return replace(start, multiplier=multiplier, product=product, residual=residual)
 
 
 def _unscaled(problem: DualProblem, solution: DualSolution) -> DualSolution:
@@ -320,27 +382,13 @@ def _slip_law(
     return law
 
 
-def _begin(
-    problem: DualProblem, operator: CountedOperator, start: DualSolution | Vector | None, same: bool
-) -> Start:
+def _begin(problem: DualProblem, operator: CountedOperator, start: _Cold) -> Start:
     """Compute product and residual of the starting multiplier. Collective; at most one product."""
-    coarse = problem.coarse
-    earlier = start if isinstance(start, DualSolution) else None
-    if earlier is not None and same:
-        multiplier, product = earlier.multiplier, earlier.product
-    else:
-        given = start if earlier is None else earlier.multiplier
-        multiplier = coarse.particular() if given is None else np.array(given, dtype=np.float64)
-        with together(problem.comm):
-            _require_size(multiplier, problem.layout.size)
-        # A cold start is never the answer, and rounding of its product is that of the first step's.
-        apply = operator if given is None else operator.exactly
-        product = apply_unless_zero(problem, apply, multiplier)
-    if earlier is not None and earlier.alpha.shape == (coarse.m,):
-        iterate = iterate_at(problem, multiplier, product, earlier.alpha)
-    else:
-        iterate = iterate_fitted(problem, multiplier, product)
-    begin = Start(iterate, operator, None if earlier is None else earlier.memory, cold=start is None)
+    multiplier = start.multiplier(problem)
+    with together(problem.comm):
+        _require_size(multiplier, problem.layout.size)
+    iterate = start.iterate(problem, multiplier, start.product(problem, operator, multiplier))
+    begin = Start(iterate, operator, start.memory, cold=start.cold)
     if begin.cold or problem.is_loaded or may_grip(problem, multiplier):
         return begin
     # No body is loaded: zero forces, free of cost, may be closer than those of another load.
