@@ -451,7 +451,7 @@ class _Run:
             return Damped(full, longest)
         if full.residuals.worst <= method.enough * before.worst:
             return Damped(full, longest)
-        earlier = (None if old is None else old.at_rows for old in (before, state.before))
+        earlier = (old.at_rows for old in (before, state.before) if old is not None)
         found = damp(full, after, lambda each: each.residuals.at_rows, earlier)
         return replace(found, fraction=found.fraction * longest)
 

@@ -277,14 +277,44 @@ class FaceNewton:
         return run_newton(run, run.init())
 
 
+class _NoRescue:
+    """There was no rescue yet."""
+
+    vain: int = -1
+
+    def repeats(self, origin: Iterate) -> bool:
+        """Return whether one from an iterate begins where the last one did."""
+        return False
+
+    def budget_after(self, usual: int, origin: Iterate, best: Iterate) -> int:
+        """Return the products of one from an iterate."""
+        return usual
+
+    def vain_after(self, origin: Iterate, result: Iterate) -> int:
+        """Return how many, including one with a result, led to the same iterate."""
+        return 0
+
+
+NO_RESCUE = _NoRescue()
+
+
 @dataclass(frozen=True, eq=False)
-class _LastRescue:
+class _LastRescue(_NoRescue):
     """The data of the last rescue that the next one needs."""
 
     origin: Iterate  # its initial iterate
     result: Iterate  # its final iterate
     budget: int  # products that it was allowed
     vain: int  # consecutive rescues, including this one, that led to the same iterate
+
+    def repeats(self, origin: Iterate) -> bool:
+        return origin is self.origin
+
+    def budget_after(self, usual: int, origin: Iterate, best: Iterate) -> int:
+        return 2 * self.budget if self.repeats(origin) or best is self.result else usual
+
+    def vain_after(self, origin: Iterate, result: Iterate) -> int:
+        return self.vain + 1 if self.repeats(origin) and _same(self.result, result) else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,7 +328,7 @@ class _State:
     since_best: int = 0  # Newton steps since the best iterate
     care: float = 1.0  # factor on the tolerance of the next face
     rescues: int = 0
-    last_rescue: _LastRescue | None = None
+    last_rescue: _NoRescue = NO_RESCUE
     exact_at: float = 1.0  # residual where the product was last computed in double precision
     answer: Certificate | None = None  # the certified solution, once there is one
     least: Iterate | None = None  # the iterate with the least residual of all, None before the first step
@@ -344,7 +374,7 @@ class _Run:
         parameters, products = self.parameters, self.start.operator.products
         if state.answer is not None:
             return state.answer.solution(state.history, products, state.memory)
-        in_vain = state.last_rescue is not None and state.last_rescue.vain >= parameters.max_vain
+        in_vain = state.last_rescue.vain >= parameters.max_vain
         if in_vain or len(state.history) >= parameters.max_steps or products >= parameters.max_products:
             self._fail(state)
         return None
@@ -391,17 +421,14 @@ class _Run:
         operator, last = self.start.operator, state.last_rescue
         origin = self._rescue_start(state.best)
         # If Newton made no progress from the last rescue, the next one must go further.
-        again = last is not None and origin is last.origin
-        budget = self.parameters.rescue_products
-        if last is not None and (again or state.best is last.result):
-            budget = 2 * last.budget
+        budget = last.budget_after(self.parameters.rescue_products, origin, state.best)
         left = max(self.parameters.max_products - operator.products, 1)
         begin = Start(origin, operator, state.memory, cold=False)
+        again = last.repeats(origin)
         outcome = self.rescue(begin, min(budget, left), further=again, number=state.rescues)
         line = self._line(state, origin, outcome)
         self.start.reached(line)
         iterate, answer = self._checked(outcome.iterate, state.exact_at)
-        vain = last.vain + 1 if last is not None and again and _same(last.result, iterate) else 0
         return replace(
             state,
             newton=replace(state.newton, iterate=iterate),
@@ -411,7 +438,7 @@ class _Run:
             history=(*state.history, line),
             since_best=0,
             rescues=state.rescues + 1,
-            last_rescue=_LastRescue(origin, iterate, budget, vain),
+            last_rescue=_LastRescue(origin, iterate, budget, last.vain_after(origin, iterate)),
             answer=answer,
         )
 

@@ -159,6 +159,14 @@ class ObliqueProjector:
         """Return (G_u G_sᵀ)⁻¹ G_u v, replicated. Collective."""
         return self.solve(self.moving.apply(v))
 
+    def preserve(self, v: Vector) -> Vector:
+        """Return the nearest y with G_u y = 0. Collective."""
+        return self.moving.project(v)
+
+    def balancing(self, resultant: Vector) -> Vector:
+        """Return y in the range of G_sᵀ with G_u y = resultant. Collective."""
+        return self.transposed @ self.solve(resultant)
+
     @cached_property
     def transposed(self) -> sp.csc_matrix | Composed:
         """G_sᵀ, which shares the memory of G_s, shape (n_face, m)."""
@@ -181,7 +189,7 @@ class DampedEquilibrium:
     damping: Vector
     coarse: CoarseSpace
 
-    def project(self, v: Vector) -> Vector:
+    def preserve(self, v: Vector) -> Vector:
         """Return v − D² ZᵀGᵀ (G Z D² ZᵀGᵀ)⁻¹ G Z v. Collective."""
         return self.damping * self.coarse.project(v / self.damping)
 
@@ -196,8 +204,8 @@ class CoupledSystem:
 
     Newton's step tests with the face's own basis W = Z_s and moves the multiplier along Z = Z_u = Z_s +
     growth: the column of a normal multiplier includes the slipping friction μ ŵ. The adjoint swaps the two.
-    `tested`: W; `moving`: Z; `curvature`: κ; `damped`: preserves equilibrium where offsets are held in place;
-    None where all entries share equally.
+    `tested`: W; `moving`: Z; `curvature`: κ; `equilibrium`: preserves equilibrium, where offsets are held in
+    place with little motion of these.
     """
 
     system: FaceSystem
@@ -205,7 +213,7 @@ class CoupledSystem:
     moving: sp.csr_matrix
     curvature: Vector
     oblique: ObliqueProjector
-    damped: DampedEquilibrium | None = None
+    equilibrium: DampedEquilibrium | ObliqueProjector
 
     @classmethod
     def build(
@@ -235,7 +243,7 @@ class CoupledSystem:
             return None
         kappa = system.face.curvature if curvature is None else curvature
         if not damped:
-            return cls(system, tested, moving, kappa, oblique)
+            return cls(system, tested, moving, kappa, oblique, oblique)
         damping = np.maximum(system.face.damping, least_damping)
         spared = coarse.restricted(sp.csr_matrix(moving @ sp.diags(damping)), whole=whole)
         return cls(system, tested, moving, kappa, oblique, DampedEquilibrium(damping, spared))
@@ -259,15 +267,11 @@ class CoupledSystem:
 
     def precondition(self, residual: Vector) -> Vector:
         """Apply the symmetric preconditioner and restore equilibrium, G Z z = 0. Collective."""
-        equilibrium = self.damped or self.oblique.moving
-        return equilibrium.project(self.system.precondition(residual))
+        return self.equilibrium.preserve(self.system.precondition(residual))
 
     def balanced(self, y: Vector, load: Vector) -> Vector:
         """Return y moved so that G Z y = load, shape (n_face,). Collective."""
-        missing = self.oblique.moving.apply(y) - load
-        if self.damped is not None:
-            return y - self.damped.balancing(missing)
-        return y - self.oblique.transposed @ self.oblique.solve(missing)
+        return y - self.equilibrium.balancing(self.oblique.moving.apply(y) - load)
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,12 @@ class FaceStep:
 
 
 #: Whether a step is accurate enough, from δ, F Z δ and its measure: more may be missing than the face knows.
-Enough: TypeAlias = Callable[[Vector, Vector, float], bool]
+Enough: TypeAlias = Callable[[Callable[[], tuple[Vector, Vector]], float], bool]
+
+
+def never(*_: object) -> bool:
+    """Return that a step is not accurate enough before its measure is."""
+    return False
 
 
 class _Rows:
@@ -105,7 +110,7 @@ def projected_cg(
     weights: Vector,
     tolerance: float,
     max_iterations: int,
-    enough: Enough | None = None,
+    enough: Enough = never,
     asked_every: int = 4,
 ) -> FaceStep:
     """Minimise ½ δᵀA δ + gᵀδ over G Z δ = 0 with A = Zᵀ F Z + κ. Collective.
@@ -154,7 +159,7 @@ def projected_cg(
             stop = Stop.STAGNATION
             break
         asked = iterations % asked_every == 0 and size > tolerance
-        if enough is not None and asked and enough(step, product, size):
+        if asked and enough(lambda: (step, product), size):
             stop = Stop.ENOUGH
             break
     return FaceStep(step, product, residual, iterations, size, stop)
@@ -199,7 +204,7 @@ def projected_gmres(
     weights: Vector,
     tolerance: float,
     max_iterations: int,
-    enough: Enough | None = None,
+    enough: Enough = never,
     *,
     restart_at: float = 1e-5,
     longest: int = 40,
@@ -249,7 +254,7 @@ def _krylov_step(
     tolerance: float,
     max_iterations: int,
     before: tuple[Vector, Vector],
-    enough: Enough | None,
+    enough: Enough,
 ) -> tuple[Krylov, Vector, Vector]:
     """Return the Krylov space of a weighted residual, and a step and its product with what is added to them.
 
@@ -268,7 +273,9 @@ def _krylov_step(
             step = coupled.balanced(step, np.zeros(coupled.oblique.moving.m))
         return before[0] + step, before[1] + product
 
-    ends = None if enough is None else lambda found: enough(*both(found), found.residual)
+    def ends(found: Callable[[], Krylov], size: float) -> bool:
+        return enough(lambda: both(found()), size)
+
     single, patience = system.single, system.patience
     found = gmres(system.comm, first, expand, tolerance, max_iterations, patience, ends, single=single)
     return found, *both(found)
@@ -304,7 +311,7 @@ def gmres(
     tolerance: float,
     max_iterations: int,
     patience: int,
-    enough: Callable[[Krylov], bool] | None = None,
+    enough: Callable[[Callable[[], Krylov], float], bool] = never,
     asked_every: int = 4,
     *,
     single: bool = False,
@@ -334,10 +341,10 @@ def gmres(
             # The Krylov space is exhausted: the remainder lies outside the operator's range.
             stop = Stop.CONVERGED if small.residual <= tolerance else Stop.NO_CURVATURE
             break
-        if enough is not None and basis.count % asked_every == 0 and small.residual > tolerance:
-            if enough(Krylov(small.solution(), kept, small.residual, stop)):
-                stop = Stop.ENOUGH
-                break
+        asked = basis.count % asked_every == 0 and small.residual > tolerance
+        if asked and enough(lambda: Krylov(small.solution(), kept, small.residual, stop), small.residual):
+            stop = Stop.ENOUGH
+            break
         vector = image / column[-1]
     return Krylov(small.solution(), kept, small.residual, stop)
 

@@ -12,7 +12,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
@@ -23,7 +23,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_system import CoupledFace, FaceSystem, FaceSystems, couple
-from fenics_contact.qp.krylov import FaceStep, Stop, projected_cg, projected_gmres
+from fenics_contact.qp.krylov import FaceStep, Stop, never, projected_cg, projected_gmres
 from fenics_contact.qp.problem import CountedOperator, DualProblem, RowsOfFace, ShiftedOperator
 from fenics_contact.qp.reductions import Vector, global_least, global_sum
 from fenics_contact.qp.rigid_motions import RigidMotionCorrection, keep_free_motions
@@ -81,14 +81,13 @@ class Forcing:
         """Return forcing terms that are no larger than these."""
         return replace(self, largest=min(self.largest, largest), loosest=min(self.loosest, loosest))
 
-    def by_prediction(self, residuals: Residuals, mismatch: float | None, care: float) -> float:
+    def by_prediction(self, residuals: Residuals, mismatch: float, care: float) -> float:
         """Return the weighted residual at which a face is solved, by choice 1.
 
         `mismatch`: difference of the last residual from the one that its face predicted, relative to the
-        residual before; None if the face has changed.
+        residual before; infinite if the face has changed.
         """
-        term = self.largest if mismatch is None else min(self.largest, mismatch)
-        wanted = min(self.loosest, care * term * residuals.worst)
+        wanted = min(self.loosest, care * min(self.largest, mismatch) * residuals.worst)
         return max(wanted, 0.3 * self.tolerance)
 
     def by_reduction(self, worst: float, before: float | None, last: float, care: float) -> float:
@@ -98,6 +97,10 @@ class Forcing:
             safeguard = 0.9 * last**2
             term = min(term, max(0.9 * (worst / before) ** 2, safeguard if safeguard > 0.1 else 0.0))
         return care * max(term, 0.3 * self.tolerance / max(worst, self.tolerance))
+
+
+#: Parts of a step that are tried where its end is worse.
+SHORTER = (0.5, 0.25, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,23 +115,21 @@ def damp(
     full: Point,
     at: Callable[[float], Point],
     measured: Callable[[Point], Residuals],
-    earlier: Iterable[Residuals | None],
+    earlier: Iterable[Residuals],
     *,
-    fractions: tuple[float, ...] = (0.5, 0.25, 0.1),
-    shortest: float | None = None,
+    fractions: tuple[float, ...] = SHORTER,
 ) -> Damped[Point]:
     """Return the end of a step, or the best of a few points on it if that is worse. Collective.
 
     Where the active set alternates between two faces the solution lies between them. The way to the right
     face may lead over a worse one: a full step is taken if it improves on either of the last two points.
-    `earlier`: those of the last two points, None without; `fractions`: parts of the step that are tried where
-    its end is worse; `shortest`: one more, for the neighbourhood of a solution.
+    `earlier`: those of the last two points; `fractions`: parts of the step that are tried where its end is
+    worse.
     """
     end = measured(full)
-    if any(old is not None and not end.is_worse_than(old) for old in earlier):
+    if any(not end.is_worse_than(old) for old in earlier):
         return Damped(full, 1.0)
-    parts = fractions if shortest is None else (*fractions, shortest)
-    tried = [Damped(full, 1.0), *(Damped(at(part), part) for part in parts)]
+    tried = [Damped(full, 1.0), *(Damped(at(part), part) for part in fractions)]
     return min(tried, key=lambda each: measured(each.point).worst_in_scales_with(end))
 
 
@@ -212,7 +213,7 @@ def shorten(
     problem: DualProblem,
     before: Iterate,
     after: Iterate,
-    earlier: Residuals | None = None,
+    earlier: Sequence[Residuals] = (),
     *,
     shortest: float = 0.01,
     near: float = 0.5,
@@ -227,8 +228,8 @@ def shorten(
         after,
         lambda part: iterate_between(problem, before, after, part),
         lambda iterate: iterate.residuals,
-        (before.residuals, earlier),
-        shortest=shortest if before.residuals.worst < near else None,
+        (before.residuals, *earlier),
+        fractions=(*SHORTER, shortest) if before.residuals.worst < near else SHORTER,
     )
 
 
@@ -244,7 +245,7 @@ class Safeguards:
     tolerance of a face relative to the residual.
     """
 
-    shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped[Iterate]] = shorten
+    shorten: Callable[[DualProblem, Iterate, Iterate, Sequence[Residuals]], Damped[Iterate]] = shorten
     adapts_step: bool = True
     moves_held: bool = True
     reduction: float = 0.3
@@ -267,7 +268,7 @@ class FaceState:
     step: Vector
     faces: tuple[Face, ...] = ()
     mismatch: float = 1.0
-    before: Residuals | None = None
+    earlier: tuple[Residuals, ...] = ()
     fraction: float = 1.0
 
     def stall(self, comm: MPI.Comm) -> str:
@@ -359,11 +360,11 @@ class FaceSteps:
         count = face.changes(state.faces[0]) if state.faces else 0
         changed = round(float(global_sum(self.problem.comm, count)[0]))
         # (a), (c) Its solution, as accurate as the last face's prediction warrants.
-        expected = None if changed else state.mismatch
-        tolerance = self.forcing.by_prediction(before.residuals, expected, care)
+        mismatch = np.inf if changed else state.mismatch
+        tolerance = self.forcing.by_prediction(before.residuals, mismatch, care)
         if self.problem.exact is not None:
             tolerance = max(tolerance, self.safeguards.rounded * before.residuals.worst)
-        solved = self._solve(face, before, tolerance, predicted=expected is not None)
+        solved = self._solve(face, before, tolerance, predicted=not changed)
         # (d) Rigid motions, then the damped step.
         alpha = self._motions(solved, before, step)
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
@@ -374,10 +375,10 @@ class FaceSteps:
         whole = stuck or before.residuals.coarse > self.safeguards.balanced
         taken = Damped(after, 1.0)
         if not whole:
-            taken = self.safeguards.shorten(self.problem, before, after, state.before)
+            taken = self.safeguards.shorten(self.problem, before, after, state.earlier)
         # A copy without Z and what else was computed on the face: of earlier ones only the marks are of use.
         faces = (replace(face), *state.faces[: self.safeguards.longest_cycle])
-        following = FaceState(taken.point, step, faces, mismatch, before.residuals, taken.fraction)
+        following = FaceState(taken.point, step, faces, mismatch, (before.residuals,), taken.fraction)
         return following, self._record(number, taken, solved, changed)
 
     def _next_face(self, state: FaceState) -> tuple[Vector, Face]:
@@ -417,7 +418,8 @@ class FaceSteps:
 
         seen: list[float] = []
 
-        def enough(step: Vector, image: Vector, size: float) -> bool:
+        def enough(found: Callable[[], tuple[Vector, Vector]], size: float) -> bool:
+            step, image = found()
             moved, whole = entered + linear.advance(step), product + image
             alpha = self._fitted(system, linear, moved, whole, before)
             residuals = iterate_at(problem, moved, whole, alpha).residuals
@@ -429,7 +431,7 @@ class FaceSteps:
         # Rows that contradict each other have a residual that no step changes; where nothing presses there is
         # no force to measure others by.
         asked = predicted and contrary is None and before.residuals.natural > 0.0
-        ends = enough if asked else None
+        ends = enough if asked else never
         if isinstance(linear, CoupledFace):
             inner = projected_gmres(linear.coupled, gradient, weights, tolerance, limit, ends)
         else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,7 +87,7 @@ def descend(
     problem: DualProblem,
     before: Iterate,
     after: Iterate,
-    earlier: Residuals | None = None,
+    earlier: Sequence[Residuals] = (),
     *,
     steep: float = 0.3,
     level: float = 0.1,

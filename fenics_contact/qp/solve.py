@@ -186,7 +186,10 @@ class _Cold:
     """A start from the shortest multiplier in equilibrium."""
 
     cold = True
-    memory: SmalseMemory | None = None
+
+    @property
+    def memory(self) -> SmalseMemory | None:
+        return None
 
     def scaled(self, factor: Vector | float) -> _Cold:
         return self
@@ -227,7 +230,7 @@ class _Solved(_Warm):
     solution: DualSolution
 
     @property
-    def memory(self) -> SmalseMemory | None:  # type: ignore[override]
+    def memory(self) -> SmalseMemory | None:
         return self.solution.memory
 
     @classmethod

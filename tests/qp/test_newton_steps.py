@@ -193,7 +193,7 @@ def test_a_step_may_be_worse_than_the_last_iterate_if_it_is_better_than_the_one_
         iterate(problem, part * solution.multiplier, solution.alpha) for part in (1.01, 1.1, 2.0)
     )
     assert shorten(with_bounds(problem), good, fair).point is not fair
-    assert shorten(with_bounds(problem), good, fair, bad.residuals).point is fair
+    assert shorten(with_bounds(problem), good, fair, [bad.residuals]).point is fair
 
 
 @pytest.mark.parametrize(("size", "fraction"), [(1.0, 0.01), (100.0, 0.1)], ids=["near", "far"])
