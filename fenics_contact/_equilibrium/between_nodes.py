@@ -137,9 +137,7 @@ def where_they_are(state: State, undeformed: InsideOf, number: int) -> InsideOf:
     """Return the surfaces of a pair where a state has them, undeformed where displacements are small."""
     if not state.scene.deforms_much:
         return undeformed
-    points = cast("DeformedState", state).equilibrium.evaluation.contact.points
-    assert points is not None
-    return undeformed.moved(points.coordinates, points.placements[number])
+    return cast("DeformedState", state).equilibrium.evaluation.contact.where_they_are(undeformed, number)
 
 
 def displaced_at(state: State, nodes: np.ndarray) -> np.ndarray:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import astuple, replace
+from collections.abc import Callable
+from dataclasses import astuple, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.other_rows import prescribed_as_is
 from fenics_contact._equilibrium.outer_loops import outer_loops
-from fenics_contact._equilibrium.previous import Previous, Wanted
+from fenics_contact._equilibrium.previous import ONLY_STEP, Previous, Wanted
 from fenics_contact._equilibrium.starts import CoarseStart, carried_over
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
@@ -24,10 +25,15 @@ from fenics_contact._equilibrium.static_admissibility import (
 from fenics_contact._equilibrium.stored import Stored, require_rows, with_stored_slip
 from fenics_contact._equilibrium.warnings import advice
 from fenics_contact._fem.mechanics import History
-from fenics_contact._large_deformations.equations import Configuration, Equations, ResidualState
+from fenics_contact._large_deformations.equations import (
+    Configuration,
+    Equations,
+    Linearisation,
+    ResidualState,
+)
 from fenics_contact._large_deformations.load_steps import AutomaticSteps, Near, Path, PathEndsError, Snap
 from fenics_contact._large_deformations.loading import Loading
-from fenics_contact._large_deformations.moving_contact import Contact, ContactConfiguration, MovingContact
+from fenics_contact._large_deformations.moving_contact import Contact
 from fenics_contact._large_deformations.newton import Effort, NonlinearEquilibrium, NotHeldError
 from fenics_contact._large_deformations.rigid_surfaces import driven_further
 from fenics_contact._pairing.inside import InFacets
@@ -50,7 +56,7 @@ from fenics_contact.results.rigid_motions import UnheldMotion
 from fenics_contact.results.state import Energies, State
 
 if TYPE_CHECKING:
-    from fenics_contact._pairing.sliding.slip import MaterialPoints
+    from fenics_contact._pairing.sliding.points import SlidingPoints
 
 
 _LOG = logging.getLogger(__name__)
@@ -106,44 +112,23 @@ class DeformedEquilibria:
         self._equations.contact.put_inside(places)
 
     def _solve(self, scene: Scene, previous: Previous, wanted: Wanted) -> DeformedState:
-        steps, step, before = self._steps, wanted.step, previous.before
-        if wanted.tolerance is not None:
-            if not isinstance(wanted.tolerance, float):
-                raise InvalidInputError(
-                    f"the tolerance of nonlinear materials must be a number, got {wanted.tolerance!r}: their "
-                    "errors are not estimated; leave it out for 1e-8"
-                )
-            steps = replace(steps, newton=replace(steps.newton, tolerance=wanted.tolerance))
-        equations, timer = self._equations, self._timer
-        acted, begin, known = None, equations.at_rest(), None
+        equations, timer, before = self._equations, self._timer, previous.last
+        steps = _as_accurate_as(wanted, self._steps)
         with timer.phase("assemble"):
-            if isinstance(before, TransferredState):
-                acted, begin = self._on_meshes_of(scene, before)
-                before = before.state
-            elif isinstance(before, DeformedState):
-                acted, known = before.load, before.equilibrium.linearisation
-                begin = before.equilibrium.configuration
-                same = before.torn.decomposition is self.decomposition
-                same = same and self._places.are_those_of(_places_of(before, scene.dim))
-                if not (same and contacts_alike(scene, before.scene)):
-                    (acted, begin), known = self._held_otherwise(scene, before), None
-        self._require_later(scene, begin.time, wanted.time)
+            start = self._start(scene, previous)
+        self._require_later(scene, start.time, wanted.time)
         with timer.phase("assemble"):
             overlap = wanted.design or previous.is_coarser
-            load = self._loading(scene, wanted.time, step, overlap)
-            if isinstance(before, DeformedState) and acted is not None:
-                if any(joint.draws for joint in load.torn.groups.joints):
-                    acted = begun_as(before, acted, load)
-                acted, load = moved_as(begin, acted, load, equations.contact)
-            if acted is None:
-                check_held(load.torn)
+            load = self._loading(scene, wanted.time, wanted.step, overlap)
+            acted, load = start.loads(load, equations.contact)
             if self._unresisted is None:  # supports stay what they are in later steps
                 self._unresisted = unresisted_motions(load.torn)
             require_resisted(self._unresisted, load.torn, load.prescribed)
+            begin = start.configuration(equations, acted)
         try:
-            near = self._near(load, previous.start) if before is None else None
+            near = self._near(load, previous)
             path = steps.follow(
-                equations, acted, load, begin, timer, known, held=not self._unresisted, near=near
+                equations, acted, load, begin, timer, start.known, held=not self._unresisted, near=near
             )
         except (InfeasibleError, NotHeldError) as failure:
             if not self._unresisted:
@@ -153,27 +138,38 @@ class DeformedEquilibria:
         except PathEndsError as failure:
             _require_more_than_springs(load.torn, failure)
             last = None if failure.path is None else _state_after(failure.path, before, timer, steps)
-            where = "" if step is None else f"load step {step.name!r}: "
-            hints = advice(scene, last or before, moves=isinstance(equations.contact, MovingContact))
-            words = f"{where}{failure}{hints}"
+            words = f"{wanted.where}{failure}{advice(scene, last or before)}"
             raise LoadStepError(words, failure.history, last) from failure
         return _state_after(path, before, timer, steps)
 
-    def _near(self, load: Loading, coarse: State | CoarseStart | None) -> Near | None:
+    def _start(self, scene: Scene, previous: Previous) -> _FromRest:
+        """Return where a load step begins. Collective."""
+        before = previous.last
+        if not isinstance(before, DeformedState):
+            return _FromRest()
+        if isinstance(previous.before, TransferredState):
+            return _FromState(before, *self._on_meshes_of(scene, previous.before), None)
+        same = before.torn.decomposition is self.decomposition
+        same = same and self._places.are_those_of(_places_of(before, scene.dim))
+        if not (same and contacts_alike(scene, before.scene)):
+            return _FromState(before, *self._held_otherwise(scene, before), None)
+        end = before.equilibrium
+        return _FromState(before, before.load, end.configuration, end.linearisation)
+
+    def _near(self, load: Loading, previous: Previous) -> Near | None:
         """Return how Newton's method begins on refined meshes; None where equilibria depend on the way there.
 
         Rigid surfaces turn along their arcs, fluid goes on, and slip begins where nodes are first found.
         """
-        steps = self._steps
-        by_way = load.turned or bool(outer_loops(load.torn.scene))
+        steps, coarse = self._steps, previous.start
+        by_way = load.turned or previous.last or outer_loops(load.torn.scene)
         if not isinstance(coarse, CoarseStart) or by_way or steps.snaps or steps.finer_history:
             return None
 
         def near(load: Loading, at: Configuration) -> Configuration:
-            moved, contact = coarse.displacement(load.torn), at.contact
-            assert contact is not None
-            there = self._equations.contact.at(load, moved, replace(contact, points=None))
-            if there.start is not contact.start:
+            moved = coarse.displacement(load.torn)
+            there = self._equations.contact.anew(load, moved, at.contact)
+            if there.slip_start is not at.contact.slip_start:
                 raise ConvergenceError("nodes are first found on the way")
             forces = coarse.at_contact(there.torn)
             found = replace(at, displacement=moved, multiplier=forces, contact=there)
@@ -202,8 +198,14 @@ class DeformedEquilibria:
         snaps = tuple(Snap(fraction, way, work, int(stages)) for fraction, way, work, stages in rows)
         since = float(stored.get("since", 0.0))
         earlier_friction_work = float(stored.get("rubbed", 0.0))
-        path = Path(whole, end, None, None, fractions, since, snaps, earlier_friction_work, end.effort)
-        return _state_after(path, None, timer, None, stored.get("slip"))
+        start = at.contact.slip_start
+        path = Path(whole, end, None, start, fractions, since, snaps, earlier_friction_work, end.effort)
+
+        def slipped(contact: ContactResult) -> ContactResult:
+            slip, before = stored.get("slip", (contact.slip, contact.slip_before))
+            return replace(contact, slip=slip, slip_before=before)
+
+        return _state_of(path, timer, slipped, None)
 
     def _require_later(self, scene: Scene, earlier: float, time: float) -> None:
         materials = [each for body in scene.bodies.values() for each in body.materials]
@@ -219,7 +221,7 @@ class DeformedEquilibria:
         assert isinstance(before, DeformedState)
         acted = self._loading(carried.scene_on(scene), before.time, overlap=True)
         at, moved = before.equilibrium.configuration, carried.fields.displacement(acted.torn)
-        contact = self._equations.contact.at(acted, moved, None)
+        contact = self._equations.contact.first(acted, moved)
         kept = before.history.carried(before.scene, scene, carried.transfers).values
         was = before.torn_displacement
         squares = global_sum(self.decomposition.comm, was @ was, moved @ moved)
@@ -262,13 +264,12 @@ class DeformedEquilibria:
                 f"scene, got {len(pairs[1])} of {len(pairs[0])}: give the scene's pairs in another order"
             )
         at = before.equilibrium.configuration
-        assert at.contact is not None
         acted = self._loading(
             replace(before.scene, supports=scene.supports, contacts=scene.contacts), before.time, overlap=True
         )
         was = prescribed_as_is(before.torn, at.displacement, self.decomposition)
         acted = acted.at_rest(was)
-        contact = self._equations.contact.at(acted, at.displacement, None)
+        contact = self._equations.contact.first(acted, at.displacement)
         forces = carried_over(at.contact.torn, at.multiplier, contact.torn)
         start = replace(at, multiplier=forces, diagonal=None, contact=contact.from_here(forces))
         evaluation = self._equations.evaluate_at(acted, start)
@@ -280,7 +281,7 @@ class DeformedEquilibria:
         return acted, _balanced(self._equations.evaluate_at(acted, start))
 
     def _loading(
-        self, scene: Scene, time: float, step: LoadStep | None = None, overlap: bool = False
+        self, scene: Scene, time: float, step: LoadStep = ONLY_STEP, overlap: bool = False
     ) -> Loading:
         """Return what acts at a time. Collective."""
         load = Loading.of(scene, self.decomposition, time, self._assembled, step=step, overlap=overlap)
@@ -288,6 +289,56 @@ class DeformedEquilibria:
         if scene.deforms_much:
             return load
         return replace(load, torn=with_places(load.torn, self._places.by_number(load.torn.points)))
+
+
+class _FromRest:
+    """A load step of bodies at rest, without loads."""
+
+    time = 0.0
+    known: Linearisation | None = None
+
+    def loads(self, load: Loading, contact: Contact) -> tuple[Loading, Loading]:
+        """Return what acts at its start and its end. Collective."""
+        check_held(load.torn)
+        return load.removed(), load
+
+    def configuration(self, equations: Equations, acted: Loading) -> Configuration:
+        """Return the configuration at its start. Collective."""
+        return equations.at_rest(acted)
+
+
+@dataclass(frozen=True, eq=False)
+class _FromState(_FromRest):
+    """A load step after a state; `acted`: what acted there; `at`: where it ended."""
+
+    before: DeformedState
+    acted: Loading
+    at: Configuration
+    known: Linearisation | None
+
+    @property
+    def time(self) -> float:  # type: ignore[override]
+        return self.at.time
+
+    def loads(self, load: Loading, contact: Contact) -> tuple[Loading, Loading]:
+        acted = self.acted
+        if any(joint.draws for joint in load.torn.groups.joints):
+            acted = begun_as(self.before, acted, load)
+        return moved_as(self.at, acted, load, contact)
+
+    def configuration(self, equations: Equations, acted: Loading) -> Configuration:
+        return self.at
+
+
+def _as_accurate_as(wanted: Wanted, steps: AutomaticSteps) -> AutomaticSteps:
+    """Return load steps to the wanted tolerance, by default to their own."""
+    tolerance = steps.newton.tolerance if wanted.tolerance is None else wanted.tolerance
+    if not isinstance(tolerance, float):
+        raise InvalidInputError(
+            f"the tolerance of nonlinear materials must be a number, got {tolerance!r}: their errors are not "
+            "estimated; leave it out for 1e-8"
+        )
+    return replace(steps, newton=replace(steps.newton, tolerance=tolerance))
 
 
 def _places_of(before: State | TransferredState | None, dim: int) -> InFacets:
@@ -341,7 +392,6 @@ def moved_as(at: Configuration, acted: Loading, load: Loading, contact: Contact)
     if load.is_tracked:
         there = acted.at_motions(at.motions)
         now = at.on(contact.at(there, at.displacement, at.contact))
-        assert now.contact is not None
         missing = now.contact.torn.free_imbalance(now.multiplier)
         acted = replace(acted, turned=driven_further(acted.turned, -missing))
     return acted, load.with_surfaces(tuple(each.at(at.motions) for each in load.turned))
@@ -367,14 +417,25 @@ def _require_elastic(scene: Scene) -> None:
         )
 
 
-def _state_after(
-    path: Path,
-    before: State | None,
-    timer: PhaseTimer,
-    steps: AutomaticSteps | None,
-    known: np.ndarray | None = None,
-) -> DeformedState:
+def _state_after(path: Path, before: State | None, timer: PhaseTimer, steps: AutomaticSteps) -> DeformedState:
     """Return the state at the end of a path from another state. Collective."""
+    at = path.end.evaluation.contact
+
+    def earlier_slip(points: SlidingPoints) -> np.ndarray:
+        if not isinstance(before, DeformedState):
+            return np.zeros((points.points.count, points.points.tangents.shape[1]))
+        return before.equilibrium.evaluation.contact.slip_on(points, before.contact.total_slip)
+
+    def of_step(contact: ContactResult) -> ContactResult:
+        return replace(contact, **at.of_step(contact.friction_force, path.start, earlier_slip))
+
+    return _state_of(path, timer, of_step, steps.newton.tolerance)
+
+
+def _state_of(
+    path: Path, timer: PhaseTimer, slipped: Callable[[ContactResult], ContactResult], tolerance: float | None
+) -> DeformedState:
+    """Return the state at the end of a path; `slipped`: adds the slip of moved bodies. Collective."""
     end, evaluation = path.end, path.end.evaluation
     ended = f", at {path.fractions[-1]:.3g} of the load step" if path.fractions[-1] < 1.0 else ""
     values, torn, moved = row_values_at(end), evaluation.loaded, evaluation.at.displacement
@@ -389,32 +450,14 @@ def _state_after(
         else "read from a checkpoint",
     )
     with timer.phase("state"):
-        contact = contact_result(torn, values, moved)
-        if evaluation.contact.points is not None and path.start is not None:
-            contact = _of_moved(contact, evaluation.contact, path.start, before)
-        if known is not None:
-            contact = replace(contact, slip=known[0], slip_before=known[1])
+        contact = slipped(contact_result(torn, values, moved))
         energies = _energies(evaluation, path.earlier_friction_work)
     return DeformedState(
         torn=torn, solution=solution, torn_displacement=moved, contact=contact, energies=energies,
         seconds=dict(timer.seconds), equilibrium=end, load=path.load, begun=path.begun,
-        fractions=path.fractions, since=path.since, snaps=path.snaps,
-        tolerance=None if steps is None else steps.newton.tolerance,
+        fractions=path.fractions, since=path.since, snaps=path.snaps, tolerance=tolerance,
         factorisations=path.effort.factorisations,
     )  # fmt: skip
-
-
-def _of_moved(
-    contact: ContactResult, now: ContactConfiguration, start: MaterialPoints, before: State | None
-) -> ContactResult:
-    """Return the contact of moved bodies with its areas, the slip of its load step and of all before."""
-    slip, points = now.slip(start) - now.elastic_slip(contact.friction_force), now.points
-    assert points is not None
-    slipped = np.zeros_like(slip)
-    if isinstance(before, DeformedState) and (old := before.equilibrium.evaluation.contact.points):
-        slipped = points.carry_slip(before.contact.total_slip, old)
-    areas = points.areas(now.torn.scene)
-    return replace(contact, slip=slip, slip_before=slipped, area=areas.true, nominal_area=areas.nominal)
 
 
 def _energies(evaluation: ResidualState, earlier_friction_work: float) -> Energies:
@@ -466,13 +509,10 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     history = History.unloaded(state.scene).advanced(comm, parts)
     stored |= {f"history.{name}": values for name, values in history.values.items()}
     stored |= _places_of(state, state.scene.dim).stored()
-    points, start = evaluation.contact.points, evaluation.contact.start
-    if points is None or start is None:
-        torn = evaluation.torn
-        origin = numbering.gather(torn.right + torn.supported, rows)
-        return stored | {"origin": origin, "slid": torn.slid}
-    slip = np.array([state.contact.slip, state.contact.slip_before])
-    return stored | points.stored(start) | {"slip": slip}
+    stored |= evaluation.contact.stored()
+    if "origin" in stored:
+        return stored
+    return stored | {"slip": np.array([state.contact.slip, state.contact.slip_before])}
 
 
 def stored_configuration(
@@ -500,12 +540,10 @@ def stored_configuration(
         if _stored_motion(each.place) in stored
     }
     load = load.at_motions(motions)
-    if isinstance(contact, MovingContact):
-        found = contact.found_again(load, displacement, stored)
-        require_rows(found.torn, stored)
-    else:
+    if "origin" in stored:
         load = replace(load, torn=with_stored_slip(load.torn, stored))
-        found = contact.at(load, displacement, None)
+    found = contact.found_again(load, displacement, stored)
+    require_rows(found.torn, stored)
     begin, _, largest = stored["times"]
     multiplier = stored["multiplier"][found.torn.numbering.owned]
     configuration = Configuration(displacement, multiplier, history, float(begin), float(largest), found)

@@ -28,22 +28,31 @@ if TYPE_CHECKING:
     from fenics_contact.results.deformed_state import AnyState
 
 
+#: That of a solution outside of load steps.
+ONLY_STEP = LoadStep("")
+
+
 @dataclass(frozen=True, eq=False)
 class Wanted:
     """What is wanted of a solution.
 
-    `tolerance`: its accuracy; `step`: the load step; None outside of load steps; `design`: whether it is the
-    state of a design, of which derivatives are wanted.
+    `tolerance`: its accuracy; `step`: the load step; `design`: whether it is the state of a design, of which
+    derivatives are wanted.
     """
 
     tolerance: Tolerance
-    step: LoadStep | None
+    step: LoadStep
     design: bool
 
     @property
     def time(self) -> float:
         """The time at the end, 1 by default."""
-        return 1.0 if self.step is None or self.step.time is None else self.step.time
+        return 1.0 if self.step.time is None else self.step.time
+
+    @property
+    def where(self) -> str:
+        """The load step in words that begin a message."""
+        return "" if self.step is ONLY_STEP else f"load step {self.step.name!r}: "
 
 
 class Equilibria(Protocol):

@@ -16,7 +16,7 @@ from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.linear import DirectEquilibria, LinearEquilibria, default_solver
 from fenics_contact._equilibrium.other_rows import continued
-from fenics_contact._equilibrium.previous import Equilibria, Previous, Wanted
+from fenics_contact._equilibrium.previous import ONLY_STEP, Equilibria, Previous, Wanted
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._equilibrium.warnings import ContactWarnings
 from fenics_contact._scene.memory import Fit
@@ -250,7 +250,7 @@ class ContactProblem:
         scene, previous = self.scene if scene is None else scene, Previous(before)
         with together(self.comm):
             accuracy = checked_tolerance(self.tolerance if tolerance is None else tolerance)
-            wanted = Wanted(accuracy, step, design=design)
+            wanted = Wanted(accuracy, step or ONLY_STEP, design)
             _require_obstacles_at(scene, wanted.time)
             previous.check(scene)
         scene = previous.kept(scene)

@@ -520,10 +520,11 @@ def _depth(state: State, number: int, pair: ContactPair, other: Surface) -> floa
     return -float(gap[inside].min(initial=0.0))
 
 
-def advice(scene: Scene, last: State | None = None, *, moves: bool) -> str:
+def advice(scene: Scene, last: State | None) -> str:
     """Return words to append to the message of a load step that ends, empty where there is nothing to say."""
-    moving = _on_contact(scene) + ("" if last is None else _on_ends(last)) if moves else ""
-    return moving + _on_symmetry(scene)
+    if not scene.deforms_much:
+        return _on_symmetry(scene)
+    return _on_contact(scene) + ("" if last is None else _on_ends(last)) + _on_symmetry(scene)
 
 
 def _on_ends(last: State) -> str:

@@ -19,6 +19,7 @@ from fenics_contact._large_deformations.moving_contact import (
     Contact,
     ContactConfiguration,
     MovingContact,
+    SymmetricLowRank,
     stiffened,
 )
 from fenics_contact._large_deformations.rigid_surfaces import (
@@ -88,11 +89,11 @@ def relative_residuals(
 class Configuration:
     """A displacement with the forces and the histories of materials that belong to it.
 
-    `multiplier`: λ, owned; empty where nothing is known yet; `largest`: size of the largest displacement that
+    `multiplier`: λ, owned; `largest`: size of the largest displacement that
     there has been, as in `Residuals.gluing_scale`: where bodies return to rest, residuals are relative to
     that; `diagonal`: of F on these rows, at a configuration near this one, owned; None where it is not known;
     `motions`: U, then θ, of rigid surfaces; zero where they are not among them; `contact`: the contact points
-    whose rows the multiplier has; None at the start.
+    whose rows the multiplier has.
     """
 
     displacement: Vector
@@ -100,13 +101,12 @@ class Configuration:
     history: tuple[np.ndarray | None, ...]
     time: float
     largest: float
-    contact: ContactConfiguration | None
+    contact: ContactConfiguration
     diagonal: Vector | None = None
     motions: Motions = field(default_factory=dict)
 
     def natural_step(self, caution: float = 1.0) -> Vector:
         """Return ρ of the natural map, owned, times a factor; zero where the diagonal of F is not known."""
-        assert self.contact is not None
         layout = self.contact.torn.layout
         if self.diagonal is None:
             return np.zeros(layout.size)
@@ -114,13 +114,11 @@ class Configuration:
 
     def on(self, contact: ContactConfiguration) -> Configuration:
         """Return the configuration with its forces on the rows of other contact points. Collective."""
-        multiplier: Vector = np.zeros(len(contact.torn.numbering.owned))
-        diagonal: Vector | None = None
-        if self.contact is not None:
-            multiplier = contact.carried(self.multiplier, self.contact)
-            if self.diagonal is not None:
-                diagonal = contact.carried(self.diagonal, self.contact, spread=True)
-        return replace(self, multiplier=multiplier, diagonal=diagonal, contact=contact)
+        diagonal = self.diagonal
+        if diagonal is not None:
+            diagonal = contact.carried(diagonal, self.contact, spread=True)
+        forces = contact.carried(self.multiplier, self.contact)
+        return replace(self, multiplier=forces, diagonal=diagonal, contact=contact)
 
 
 @displayed
@@ -161,7 +159,6 @@ class ResidualState:
     @property
     def contact(self) -> ContactConfiguration:
         """The contact points, with the system of their rows."""
-        assert self.at.contact is not None
         return self.at.contact
 
     @property
@@ -218,17 +215,14 @@ class ResidualState:
         """Factor the tangents, with those of springs of tools or without. Collective."""
         self._require_finite_tangents()
         uneven = self.growth.unsymmetric(self.torn.decomposition, self.load.rim)
-        turning = self.contact.turning(self.at.multiplier, uneven)
-        if turning is not None and self.load.is_tracked and springs:
-            turning = turning.with_springs(*spring_columns(self.load.turned, self.contact.prescribed.size))
-        tangents = self._tangents
+        sprung = self.load.turned if self.load.is_tracked and springs else ()
+        held = SymmetricLowRank(*spring_columns(sprung, self.contact.prescribed.size))
+        turning = self.contact.turning(self.at.multiplier, uneven, held)
         torn, further = self.torn, NO_ROWS
-        if turning is not None:
-            if turning.normal is not None:
-                tangents = stiffened(torn, tangents, turning.normal)
-            if turning.count:
-                torn = self.contact.with_rows_of(turning)
-                further = AuxiliaryRows.of(torn, self.torn, turning)
+        tangents = stiffened(torn, self._tangents, turning)
+        if turning.count:
+            torn = self.contact.with_rows_of(turning)
+            further = AuxiliaryRows.of(torn, self.torn, turning)
         right = np.concatenate([self.constraint_residual, np.zeros(further.count)])
         if torn.free.count:
             load, stiffness = self.torn.free_imbalance(self.at.multiplier), None
@@ -340,10 +334,13 @@ class Equations:
             at_rest = [m.at(np.zeros(size), step).stiffness.diagonal() for m, size in pairs]
         return np.concatenate([np.zeros(0), *at_rest])
 
-    def at_rest(self) -> Configuration:
-        """Return the undeformed configuration without forces."""
-        nothing = (None,) * len(self._mechanics)
-        return Configuration(np.zeros(self.decomposition.torn_size), np.zeros(0), nothing, 0.0, 0.0, None)
+    def at_rest(self, load: Loading) -> Configuration:
+        """Return the undeformed configuration without forces, where slip begins under a load. Collective."""
+        nothing, displacement = (None,) * len(self._mechanics), np.zeros(self.decomposition.torn_size)
+        # Slip begins where bodies are before supports and obstacles move.
+        contact = self.contact.first(load.at_motions({}), displacement)
+        forces = np.zeros(len(contact.torn.numbering.owned))
+        return Configuration(displacement, forces, nothing, 0.0, 0.0, contact)
 
     def least_jacobian(self, displacement: Vector) -> float:
         """Return the smallest det F at a torn displacement of all ranks. Collective."""
@@ -372,7 +369,6 @@ class Equations:
     ) -> ResidualState:
         """Return forces, openings and residuals at contact points that are known. Collective."""
         comm, contact = self.decomposition.comm, at.contact
-        assert contact is not None
         torn = contact.torn
         with together(comm):
             each = zip(self._mechanics, self.decomposition.parts, at.history, strict=True)

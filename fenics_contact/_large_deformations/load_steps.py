@@ -176,18 +176,17 @@ class Snapping:
 class Path:
     """The equilibria from one load to the next.
 
-    `start`: these in material coordinates of the master, of others where they were first found; None where
-    contact is that of the undeformed bodies; `fractions`: parts of the load at which equilibria were found,
-    the last one being 1; `since`: the part from which slip and the histories of materials are one step up to
-    the end: 0, unless parts are steps of their own or bodies snapped; `earlier_friction_work`: that before
-    the last step of histories, zero where the whole load is one, [force · length]; `effort`: that of all
-    parts, those that were cut included.
+    `start`: these in material coordinates of the master, of others where they were first found; `fractions`:
+    parts of the load at which equilibria were found, the last one being 1; `since`: the part from which slip
+    and the histories of materials are one step up to the end: 0, unless parts are steps of their own or
+    bodies snapped; `earlier_friction_work`: that before the last step of histories, zero where the whole load
+    is one, [force · length]; `effort`: that of all parts, those that were cut included.
     """
 
     load: Loading
     end: NonlinearEquilibrium
     begun: ContactConfiguration | None
-    start: MaterialPoints | None
+    start: MaterialPoints
     fractions: tuple[float, ...]
     since: float
     snaps: tuple[Snap, ...]
@@ -255,7 +254,7 @@ class AutomaticSteps:
     def follow(
         self,
         equations: Equations,
-        before: Loading | None,
+        before: Loading,
         target: Loading,
         start: Configuration,
         timer: PhaseTimer,
@@ -268,7 +267,7 @@ class AutomaticSteps:
 
         Args:
             equations: Internal forces, and contact.
-            before: What acts at the start; None for bodies at rest without loads.
+            before: What acts at the start.
             target: What acts at the end.
             start: The configuration at the start.
             timer: Collects the wall time.
@@ -280,13 +279,8 @@ class AutomaticSteps:
             PathEndsError: The smallest step fails.
             NotHeldError: They do not, and the first step fails for that.
         """
-        first = target.removed() if before is None else before
-        # Slip begins where bodies are before supports and obstacles move.
-        begun = first.at_motions(start.motions)
-        at = start if start.contact else start.on(equations.contact.at(begun, start.displacement, None))
-        assert at.contact is not None
-        way = _LoadStepFollower(self, equations, first, target, at.contact, timer)
-        now = Progress(at, first.torn, known, (at, first.torn), at.contact.start)
+        way = _LoadStepFollower(self, equations, before, target, start.contact, timer)
+        now = Progress(start, before.torn, known, (start, before.torn), start.contact.slip_start)
         if near is not None:
             now = way.from_near(now, near)
         with _Parts() as parts:
@@ -330,7 +324,7 @@ class Progress:
     torn: TornSystem
     known: Linearisation | None
     origin: tuple[Configuration, TornSystem]
-    start: MaterialPoints | None
+    start: MaterialPoints
     end: NonlinearEquilibrium | None = None
     reached: float = 0.0
     fractions: tuple[float, ...] = ()
@@ -352,8 +346,7 @@ class Progress:
         if self.end is not None and (self.ended or anew):
             earlier_friction_work += self.end.evaluation.friction_work
         at = found.configuration if ends else found.continued(self.origin[0])
-        torn, new = found.evaluation.torn, found.evaluation.contact.start
-        start = new if self.start is None or new is None else self.start.extended(new)
+        torn, start = found.evaluation.torn, self.start.extended(found.evaluation.contact.slip_start)
         return replace(
             self, at=at, torn=torn, known=found.linearisation, origin=(at, torn) if ends else self.origin,
             start=start, end=found, reached=fraction, fractions=(*self.fractions, fraction), since=since,
@@ -407,7 +400,6 @@ class _LoadStepFollower:
         """Return the progress after a further part of the load, or why that fails. Collective."""
         try:
             load = self._load(fraction, *now.origin)
-            assert now.at.contact is not None
             there = load.at_motions(now.at.motions)
             moved = self.equations.rigid_start.moved(now.at.contact.prescribed, there, now.at.displacement)
             found = self.steps.newton.solve(self.equations, load, now.at, self.timer, now.known, moved)
@@ -453,10 +445,7 @@ class _LoadStepFollower:
     def _load(self, fraction: float, at: Configuration, before: TornSystem) -> Loading:
         """Return the load at a part of the way, with slip that begins at a configuration. Collective."""
         load = self.target.between(self.first, fraction)
-        if self.begun.points is not None:
-            return load
-        force = at.multiplier if len(at.multiplier) else np.zeros(len(before.numbering.owned))
-        return replace(load, torn=load.torn.with_slip_from(*before.slip_origin(at.displacement, force)))
+        return self.begun.measured(load, lambda: before.slip_origin(at.displacement, at.multiplier))
 
     def path(self, now: Progress) -> Path:
         """Return the path."""

@@ -84,6 +84,10 @@ def with_added(
     return [(K + added[part, part]).tocsr() for K, part in each]
 
 
+#: The load step of loads that change in proportion to the time.
+NO_COURSE = LoadStep("")
+
+
 class DeadLoads:
     """The growth of loads with the displacement where there is none."""
 
@@ -160,7 +164,7 @@ class Loading:
     time: float
     following: tuple[tuple[float, FollowingPressures], ...] = ()
     turned: tuple[TurnedSurface, ...] = ()
-    course: LoadStep | None = None
+    course: LoadStep = NO_COURSE
     drag: Drag | None = None
     heat: tuple[np.ndarray | None, ...] = ()
 
@@ -172,7 +176,7 @@ class Loading:
         time: float,
         previous: TornSystem | None,
         *,
-        step: LoadStep | None = None,
+        step: LoadStep = NO_COURSE,
         overlap: bool = False,
     ) -> Loading:
         """Return what acts at a time; unchanged parts of a previous system are reused. Collective."""
@@ -183,10 +187,9 @@ class Loading:
             following = ((1.0, FollowingPressures(scene, decomposition)),)
         turned = TurnedSurface.all_of(scene, decomposition)
         torn = _without_tracked(torn, turned)
-        varies = step is not None and (callable(step.loads) or callable(step.supports))
         with together(decomposition.comm):
             heat = temperature_changes(scene, decomposition)
-        return cls(torn, prescribed, time, following, turned, step if varies else None, heat=heat)
+        return cls(torn, prescribed, time, following, turned, step, heat=heat)
 
     def between(self, first: Loading, part: float) -> Loading:
         """Return the load at a part of the way from another one to this. Collective.
@@ -197,7 +200,7 @@ class Loading:
         if part == 1.0:
             return self
         mixed = self._mixed(first, part)
-        if self.course is None:
+        if not (callable(self.course.loads) or callable(self.course.supports)):
             return mixed
         decomposition = self.torn.decomposition
         with together(decomposition.comm):

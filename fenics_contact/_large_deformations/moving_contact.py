@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +15,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
 from fenics_contact._large_deformations.loading import Loading, UnsymmetricLowRank, with_added
 from fenics_contact._pairing.inside import InFacets
+from fenics_contact._pairing.sliding.slip import MaterialPoints
 from fenics_contact._scene.local_axes import LocalAxes, free_matrix
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane, RigidTool
 from fenics_contact._scene.pairs import Surface
@@ -30,10 +31,13 @@ from fenics_contact.feti.torn import TornSystem, on_contact_rows
 from fenics_contact.qp.reductions import Vector
 
 if TYPE_CHECKING:
+    from fenics_contact._pairing.inside import InsideOf
+    from fenics_contact._pairing.points import ContactPoints
     from fenics_contact._pairing.sliding.points import SlidingPoints
-    from fenics_contact._pairing.sliding.slip import MaterialPoints
-    from fenics_contact._pairing.sliding.stiffness import GeometricStiffness
 
+
+#: Returns the slip before a load step at points of moved bodies, shape (n, dim − 1), [length].
+EarlierSlip: TypeAlias = "Callable[[SlidingPoints], np.ndarray]"
 
 _NONE = np.zeros(0, dtype=np.int64)
 
@@ -60,33 +64,65 @@ class RowCorrections:
 
 @displayed
 @dataclass(frozen=True, eq=False)
+class SymmetricLowRank:
+    """A symmetric stiffness V diag(D) Vᵀ of few columns, D of either sign, [force / length].
+
+    `owner`: node whose rank owns the row of a column.
+    """
+
+    columns: sp.csr_matrix
+    values: np.ndarray
+    owner: np.ndarray
+
+    @classmethod
+    def none(cls, size: int) -> SymmetricLowRank:
+        """Return none on that many dofs."""
+        return cls(sp.csr_matrix((size, 0)), np.zeros(0), _NONE)
+
+    def joined(self, other: SymmetricLowRank) -> SymmetricLowRank:
+        """Return the sum of two, the columns of the other one last."""
+        if not len(other.owner):
+            return self
+        return SymmetricLowRank(
+            sp.hstack([self.columns, other.columns], format="csr"),
+            np.concatenate([self.values, other.values]),
+            np.concatenate([self.owner, other.owner]),
+        )
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
 class FollowerStiffness:
     """How forces change as surfaces turn under them, at fixed multipliers, and gaps other than by their rows.
 
-    `normal`: of the normal forces of contact, symmetric; None where contact points do not move; `forces`:
-    directions of changes of friction forces and pressures, columns of length one; `displacements`: the
-    displacements that change them, columns of length one; `stiffness`: change of force for a displacement of
-    one; `owner`: node whose rank owns the rows of each of these.
+    `normal`: of the normal forces of contact and of springs; `blocks`: of normal forces on single nodes,
+    `block_node`; `forces`: directions of changes of friction forces and pressures, columns of length one;
+    `displacements`: the displacements that change them, columns of length one; `stiffness`: change of force
+    for a displacement of one; `owner`: node whose rank owns the rows of each of these.
     """
 
-    normal: GeometricStiffness | None
-    normal_owner: np.ndarray
+    normal: SymmetricLowRank
+    blocks: np.ndarray
+    block_node: np.ndarray
     forces: sp.csr_matrix
     displacements: sp.csr_matrix
     stiffness: np.ndarray
     owner: np.ndarray
-    corrections: RowCorrections | None
+    corrections: RowCorrections
 
     @classmethod
     def of(
         cls,
-        normal: GeometricStiffness | None,
+        normal: SymmetricLowRank,
+        blocks: tuple[np.ndarray, np.ndarray],
         others: Sequence[UnsymmetricLowRank],
-        normal_owner: np.ndarray = _NONE,
-        corrections: RowCorrections | None = None,
+        corrections: RowCorrections,
     ) -> FollowerStiffness:
-        """Return those of several stiffnesses, with at least one unsymmetric one."""
-        others = [each for each in others if each.left.shape[1]] or others[:1]
+        """Return those of several stiffnesses; blocks with their nodes."""
+        nothing = sp.csr_matrix((normal.columns.shape[0], 0))
+        others = [each for each in others if each.left.shape[1]] or [
+            UnsymmetricLowRank(nothing, nothing, _NONE)
+        ]
         L, R = (_joined([getattr(each, side) for each in others]) for side in ("left", "right"))
         owner = np.concatenate([each.owner for each in others])
         left, right = _lengths(L), _lengths(R)
@@ -96,45 +132,34 @@ class FollowerStiffness:
             for columns, lengths in ((L, left), (R, right))
         )
         stiffness = (left * right)[kept]
-        return cls(normal, normal_owner, forces, displacements, stiffness, owner[kept], corrections)
+        return cls(normal, *blocks, forces, displacements, stiffness, owner[kept], corrections)
 
-    def with_springs(
-        self, columns: sp.csr_matrix, stiffness: np.ndarray, owner: np.ndarray
-    ) -> FollowerStiffness:
-        """Return those with springs, whose rows come after those of normal forces."""
-        if not len(owner):
-            return self
-        assert self.normal is not None
-        normal = replace(
-            self.normal,
-            columns=sp.hstack([self.normal.columns, columns], format="csr"),
-            values=np.concatenate([self.normal.values, stiffness]),
-        )
-        return replace(self, normal=normal, normal_owner=np.concatenate([self.normal_owner, owner]))
+    @classmethod
+    def of_loads(cls, size: int, others: Sequence[UnsymmetricLowRank]) -> FollowerStiffness:
+        """Return that of loads alone on that many dofs."""
+        nothing = RowCorrections(sp.csr_matrix((size, 0)), _NONE, _NONE)
+        return cls.of(SymmetricLowRank.none(size), (np.zeros((0, 0, 0)), _NONE), others, nothing)
 
     @property
     def compliance(self) -> np.ndarray:
         """Of the rows of normal forces, of either sign, shape (m,), [length / force]."""
-        return np.zeros(0) if self.normal is None else 1.0 / self.normal.values
+        return np.asarray(1.0 / self.normal.values)
 
     @property
     def columns(self) -> list[tuple[sp.csr_matrix, np.ndarray]]:
         """Columns of all rows with the nodes whose ranks own them, in the order of `AuxiliaryRows`."""
-        parts = [] if self.normal is None else [(self.normal.columns, self.normal_owner)]
-        parts += [(self.forces, self.owner), (self.displacements, self.owner)]
-        if self.corrections is not None:
-            parts.append((self.corrections.columns, self.corrections.owner))
-        return parts
+        corrections = self.corrections
+        return [
+            (self.normal.columns, self.normal.owner),
+            (self.forces, self.owner),
+            (self.displacements, self.owner),
+            (corrections.columns, corrections.owner),
+        ]
 
     @property
     def count(self) -> int:
         """Number of rows."""
         return sum(len(owner) for _, owner in self.columns)
-
-    @property
-    def corrected(self) -> np.ndarray:
-        """Numbers of rows of contact that are corrected, shape (m,)."""
-        return _NONE if self.corrections is None else self.corrections.corrected
 
 
 def _joined(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
@@ -177,7 +202,7 @@ class AuxiliaryRows:
         place, ends = begin + np.arange(len(number)), normal + pairs * np.arange(3)
         forces, displacements = ((number >= first) & (number < last) for first, last in pairwise(ends))
         correcting = number >= ends[-1]
-        row = before.groups.n_equality + turning.corrected[number[correcting] - ends[-1]]
+        row = before.groups.n_equality + turning.corrections.corrected[number[correcting] - ends[-1]]
         return cls(
             compliance[number],
             place[forces],
@@ -238,14 +263,14 @@ NO_ROWS = AuxiliaryRows(np.zeros(0), _NONE, _NONE, np.zeros(0), _NONE, _NONE, np
 
 
 def stiffened(
-    torn: TornSystem, tangents: list[sp.csr_matrix], geometric: GeometricStiffness
+    torn: TornSystem, tangents: list[sp.csr_matrix], turning: FollowerStiffness
 ) -> list[sp.csr_matrix]:
     """Add blocks on single nodes, shared by their copies, to the tangents of this rank's subdomains."""
-    if len(geometric.block_node) == 0:
+    if len(turning.block_node) == 0:
         return tangents
     decomposition, dim = torn.decomposition, torn.components
-    entry, copy, place = decomposition.copies_here(geometric.block_node)
-    block = geometric.blocks[entry] * decomposition.tearing.copy_share[copy, None, None]
+    entry, copy, place = decomposition.copies_here(turning.block_node)
+    block = turning.blocks[entry] * decomposition.tearing.copy_share[copy, None, None]
     dofs = dim * place[:, None] + np.arange(dim)
     row, column = np.repeat(dofs, dim, axis=1).ravel(), np.tile(dofs, dim).ravel()
     size = decomposition.torn_size
@@ -260,25 +285,23 @@ FACETS = 2.0
 @displayed
 @dataclass(frozen=True, eq=False)
 class ContactConfiguration:
-    """The contact points at a displacement.
-
-    `points`: the points of bodies that have moved; None where those of the undeformed bodies are used;
-    `start`: the points at the start of the load step, in material coordinates of the master; None likewise.
-    """
+    """The contact points of undeformed bodies, with the system of their rows."""
 
     torn: TornSystem
-    points: SlidingPoints | None
-    start: MaterialPoints | None
     prescribed: np.ndarray
+
+    @property
+    def slip_start(self) -> MaterialPoints:
+        """The moved points at the start of the load step, in material coordinates of the master."""
+        return MaterialPoints.none(0, 0)
 
     def from_here(self, multiplier: Vector) -> ContactConfiguration:
         """Return the same points with slip that begins here, without what springs back. Collective."""
-        if self.points is None:
-            return self
-        elastic = None
-        if self.torn.groups.slips.is_elastic:
-            elastic = self.elastic_slip(self.at_points(multiplier)[1])
-        return replace(self, start=self.points.material_points(elastic))
+        return self
+
+    def measured(self, load: Loading, origin: Callable[[], tuple[np.ndarray, np.ndarray]]) -> Loading:
+        """Return a load whose system measures slip from an origin, where slip is not one of moved points."""
+        return replace(load, torn=load.torn.with_slip_from(*origin()))
 
     def elastic_slip(self, friction: np.ndarray) -> np.ndarray:
         """Return D τ of friction forces, both of shape (n, dim − 1), [length]."""
@@ -291,15 +314,99 @@ class ContactConfiguration:
 
         Gaps, minus the slip, and openings of glued rows.
         """
-        residual = self.torn.closed(self.torn.right - self.torn.jump(displacement))
-        if self.points is None or self.start is None:
-            return residual
+        return self.torn.closed(self.torn.right - self.torn.jump(displacement))
+
+    def turning(
+        self, multiplier: Vector, further: list[UnsymmetricLowRank], springs: SymmetricLowRank
+    ) -> FollowerStiffness:
+        """Return the stiffness of forces that turn with their surfaces. Collective.
+
+        `further`: that of pressures; `springs`: of tools, which only bodies meet that move far.
+        """
+        return FollowerStiffness.of_loads(self.prescribed.size, further)
+
+    def carried(self, values: Vector, other: ContactConfiguration, spread: bool = False) -> Vector:
+        """Return a vector on the rows of other points on the rows of these. Collective.
+
+        Points that are new get zero, with ``spread`` the mean of the others.
+        """
+        return values
+
+    def of_step(self, friction: np.ndarray, start: MaterialPoints, before: EarlierSlip) -> dict[str, Any]:
+        """Return what of a `ContactResult` differs from that of undeformed bodies, by name.
+
+        `friction`: forces, shape (n, dim − 1); `start`: where points lay on masters when the step began.
+        """
+        return {}
+
+    def slip_on(self, points: SlidingPoints, slip: np.ndarray) -> np.ndarray:
+        """Return slip at these points at those of moved bodies, shape (n, dim − 1), [length]."""
+        return np.zeros((points.points.count, slip.shape[1]))
+
+    def stored(self) -> dict[str, np.ndarray]:
+        """Return the points as arrays, or from where slip is measured. Collective."""
+        torn = self.torn
+        origin = torn.numbering.gather(torn.right + torn.supported, np.arange(torn.numbering.total))
+        return {"origin": origin, "slid": torn.slid}
+
+    def where_they_are(self, undeformed: InsideOf, number: int) -> InsideOf:
+        """Return the surfaces of a pair where its contact is found."""
+        return undeformed
+
+    def at_points(self, values: Vector) -> tuple[np.ndarray, np.ndarray]:
+        """Return the part of a vector on normal rows, shape (n,), and on tangents, (n, dim − 1). Collective.
+
+        That of points without friction is zero.
+        """
+        torn = self.torn
+        count, width = torn.points.count, torn.components - 1
+        rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
+        gathered = torn.numbering.gather(values, rows)
+        tangential = np.zeros((count, width))
+        tangential[torn.frictional] = gathered[count:].reshape(-1, width)
+        return gathered[:count], tangential
+
+    def with_rows_of(self, turning: FollowerStiffness) -> TornSystem:
+        """Return the system with the rows of turning forces after all others, in lengths. Collective."""
+        rows = (TurningRows(*each, self.torn.decomposition.axes) for each in turning.columns)
+        return on_contact_rows(self.torn, self._at, self.prescribed, tuple(rows))
+
+    @property
+    def _at(self) -> ContactPoints:
+        return self.torn.points
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class MovedContact(ContactConfiguration):
+    """The contact points of bodies that have moved.
+
+    `points`: where they are; `start`: at the start of the load step, in material coordinates of the master.
+    """
+
+    points: SlidingPoints
+    start: MaterialPoints
+
+    @property
+    def slip_start(self) -> MaterialPoints:
+        return self.start
+
+    def from_here(self, multiplier: Vector) -> ContactConfiguration:
+        elastic = None
+        if self.torn.groups.slips.is_elastic:
+            elastic = self.elastic_slip(self.at_points(multiplier)[1])
+        return replace(self, start=self.points.material_points(elastic))
+
+    def measured(self, load: Loading, origin: Callable[[], tuple[np.ndarray, np.ndarray]]) -> Loading:
+        return load
+
+    def constraint_residual(self, displacement: Vector) -> Vector:
+        residual = super().constraint_residual(displacement)
         gap = self.points.points.gap - self.torn.reach
         return self._with_contact_rows(residual, gap, -self.slip(self.start))
 
     def slip(self, start: MaterialPoints) -> np.ndarray:
         """Return the slip since other material points, none across planes of symmetry, shape (n, dim − 1)."""
-        assert self.points is not None
         return np.where(self._across, 0.0, self.points.slip(start))
 
     @cached_property
@@ -319,21 +426,20 @@ class ContactConfiguration:
         )
         return np.asarray(across & held)
 
-    def turning(self, multiplier: Vector, further: list[UnsymmetricLowRank]) -> FollowerStiffness | None:
-        """Return the stiffness of forces that turn with their surfaces; None without any. Collective.
-
-        `further`: that of pressures.
-        """
-        if self.points is None or self.start is None:
-            return FollowerStiffness.of(None, further) if further else None
+    def turning(
+        self, multiplier: Vector, further: list[UnsymmetricLowRank], springs: SymmetricLowRank
+    ) -> FollowerStiffness:
         normal, friction = self.at_points(multiplier)
         points, slave, normal = self.points, self.points.points.slave, np.maximum(normal, 0.0)
         stiffness, torn = points.stiffness(normal), self.torn
         apart = torn.compliance.contact.gives_way
         means = points.mean_tangents(normal, friction, self.start, apart=apart)
-        further += [
-            UnsymmetricLowRank(each.left, each.right, slave[each.point])
-            for each in (points.friction_stiffness(friction), means.stiffness)
+        further = [
+            *further,
+            *(
+                UnsymmetricLowRank(each.left, each.right, slave[each.point])
+                for each in (points.friction_stiffness(friction), means.stiffness)
+            ),
         ]
         width, frictional = self.torn.components - 1, self.torn.frictional
         rubbed = (width * frictional[:, None] + np.arange(width)).ravel()
@@ -342,40 +448,42 @@ class ContactConfiguration:
         rows = sp.vstack([-means.gap, slips[rubbed]], "csr")
         point = np.concatenate([np.arange(len(slave)), rubbed // width])
         corrections = RowCorrections.of(rows, slave[point])
-        return FollowerStiffness.of(stiffness, further, slave[stiffness.point], corrections)
+        blocks = stiffness.blocks, stiffness.block_node
+        pressed = SymmetricLowRank(stiffness.columns, stiffness.values, slave[stiffness.point])
+        return FollowerStiffness.of(pressed.joined(springs), blocks, further, corrections)
 
     def carried(self, values: Vector, other: ContactConfiguration, spread: bool = False) -> Vector:
-        """Return a vector on the rows of other points on the rows of these. Collective.
-
-        Points that are new get zero, with ``spread`` the mean of the others.
-        """
-        if self.points is None or other.points is None:
-            return values
+        moved = cast(MovedContact, other)
         torn, before = self.torn, other.torn
         normal, friction = other.at_points(values)
         if spread:
-            normal, friction = (self._filled(x, other) for x in (normal, friction))
+            normal, friction = (self._filled(x, moved.points) for x in (normal, friction))
         else:
-            normal = self.points.carry(normal, other.points)
-            friction = self.points.carry_tangential(friction, other.points)
+            normal = self.points.carry(normal, moved.points)
+            friction = self.points.carry_tangential(friction, moved.points)
             friction[self._across] = 0.0
         result = np.empty(len(torn.numbering.owned))
         equality = torn.numbering.owned < torn.n_equality
         result[equality] = values[before.numbering.owned < before.n_equality]
         return self._with_contact_rows(result, normal, friction)
 
-    def at_points(self, values: Vector) -> tuple[np.ndarray, np.ndarray]:
-        """Return the part of a vector on normal rows, shape (n,), and on tangents, (n, dim − 1). Collective.
+    def of_step(self, friction: np.ndarray, start: MaterialPoints, before: EarlierSlip) -> dict[str, Any]:
+        areas = self.points.areas(self.torn.scene)
+        return {
+            "slip": self.slip(start) - self.elastic_slip(friction),
+            "slip_before": before(self.points),
+            "area": areas.true,
+            "nominal_area": areas.nominal,
+        }
 
-        That of points without friction is zero.
-        """
-        torn = self.torn
-        count, width = torn.points.count, torn.components - 1
-        rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
-        gathered = torn.numbering.gather(values, rows)
-        tangential = np.zeros((count, width))
-        tangential[torn.frictional] = gathered[count:].reshape(-1, width)
-        return gathered[:count], tangential
+    def slip_on(self, points: SlidingPoints, slip: np.ndarray) -> np.ndarray:
+        return points.carry_slip(slip, self.points)
+
+    def stored(self) -> dict[str, np.ndarray]:
+        return self.points.stored(self.start)
+
+    def where_they_are(self, undeformed: InsideOf, number: int) -> InsideOf:
+        return undeformed.moved(self.points.coordinates, self.points.placements[number])
 
     def _with_contact_rows(self, values: Vector, normal: np.ndarray, tangential: np.ndarray) -> Vector:
         """Write values at points into the contact rows of a vector, and return it."""
@@ -385,19 +493,14 @@ class ContactConfiguration:
         values[mine] = contact[torn.numbering.owned[mine] - torn.n_equality]
         return values
 
-    def _filled(self, values: np.ndarray, other: ContactConfiguration) -> np.ndarray:
-        assert self.points is not None
-        assert other.points is not None
-        carried = self.points.carry(values, other.points)
+    def _filled(self, values: np.ndarray, other: SlidingPoints) -> np.ndarray:
+        carried = self.points.carry(values, other)
         usual = values[values > 0.0].mean() if np.any(values > 0.0) else 1.0
         return np.where(carried > 0.0, carried, usual)
 
-    def with_rows_of(self, turning: FollowerStiffness) -> TornSystem:
-        """Return the system with the rows of turning forces after all others, in lengths. Collective."""
-        decomposition = self.torn.decomposition
-        points = self.torn.points if self.points is None else self.points.points
-        rows = (TurningRows(*each, decomposition.axes) for each in turning.columns)
-        return on_contact_rows(self.torn, points, self.prescribed, tuple(rows))
+    @property
+    def _at(self) -> ContactPoints:
+        return self.points.points
 
 
 class Contact:
@@ -410,14 +513,26 @@ class Contact:
         """Return the part between two loads in which contact points can be found again. Collective."""
         return 1.0
 
-    def at(
-        self, load: Loading, displacement: Vector, last: ContactConfiguration | None
-    ) -> ContactConfiguration:
-        """Return the contact points at a displacement of this rank, torn. Collective.
+    def first(self, load: Loading, displacement: Vector) -> ContactConfiguration:
+        """Return the contact points at a displacement of this rank, torn; slip starts there. Collective."""
+        return ContactConfiguration(load.torn, load.prescribed)
 
-        The last ones, at a neighbouring displacement, have the start of slip; without any it starts here.
+    def at(self, load: Loading, displacement: Vector, last: ContactConfiguration) -> ContactConfiguration:
+        """Return the contact points at a displacement next to that of the last ones. Collective.
+
+        These have the start of slip.
         """
-        return ContactConfiguration(load.torn, None, None, load.prescribed)
+        return self.first(load, displacement)
+
+    def anew(self, load: Loading, displacement: Vector, last: ContactConfiguration) -> ContactConfiguration:
+        """Return the contact points at any displacement, with the start of slip of others. Collective."""
+        return self.first(load, displacement)
+
+    def found_again(
+        self, load: Loading, displacement: Vector, stored: Mapping[str, np.ndarray]
+    ) -> ContactConfiguration:
+        """Return the points that were stored by `ContactConfiguration.stored`. Collective."""
+        return self.first(load, displacement)
 
 
 class MovingContact(Contact):
@@ -474,26 +589,33 @@ class MovingContact(Contact):
             moved = max(moved, float(np.linalg.norm(after - before, axis=1).max()))
         return min(1.0, FACETS * self._facet / moved) if moved > 0.0 else 1.0
 
-    def at(
-        self, load: Loading, displacement: Vector, last: ContactConfiguration | None
+    def first(self, load: Loading, displacement: Vector) -> ContactConfiguration:
+        found = self._sliding.at(self._coordinates(load, displacement), None, load.time, None, load.loose)
+        return self._on_rows(load, found, found.material_points())
+
+    def at(self, load: Loading, displacement: Vector, last: ContactConfiguration) -> ContactConfiguration:
+        last = cast(MovedContact, last)
+        return self._from(load, displacement, last.points, last.start)
+
+    def anew(self, load: Loading, displacement: Vector, last: ContactConfiguration) -> ContactConfiguration:
+        return self._from(load, displacement, None, cast(MovedContact, last).start)
+
+    def _from(
+        self, load: Loading, displacement: Vector, known: SlidingPoints | None, start: MaterialPoints
     ) -> ContactConfiguration:
-        """Search for the points at a displacement. Collective."""
-        known, start = (None, None) if last is None else (last.points, last.start)
         coordinates = self._coordinates(load, displacement)
         found = self._sliding.at(coordinates, known, load.time, start, load.loose)
-        here = found.material_points()
-        start = here if start is None else start.extended(here)
-        torn = on_contact_rows(load.torn, found.points, load.prescribed)
-        return ContactConfiguration(torn, found, start, load.prescribed)
+        return self._on_rows(load, found, start.extended(found.material_points()))
 
     def found_again(
         self, load: Loading, displacement: Vector, stored: Mapping[str, np.ndarray]
     ) -> ContactConfiguration:
-        """Return the points that were stored by `SlidingPoints.stored`. Collective."""
         coordinates = self._coordinates(load, displacement)
-        found, start = self._sliding.found_again(stored, coordinates, load.time, load.loose)
+        return self._on_rows(load, *self._sliding.found_again(stored, coordinates, load.time, load.loose))
+
+    def _on_rows(self, load: Loading, found: SlidingPoints, start: MaterialPoints) -> ContactConfiguration:
         torn = on_contact_rows(load.torn, found.points, load.prescribed)
-        return ContactConfiguration(torn, found, start, load.prescribed)
+        return MovedContact(torn, load.prescribed, found, start)
 
     def _coordinates(self, load: Loading, displacement: Vector) -> np.ndarray:
         """Return where all nodes of contact surfaces are, shape (n_nodes, dim), [length]. Collective."""

@@ -498,8 +498,8 @@ def starts(
     shows, the tangent knows better where bodies go.
     """
     contact = at.contact
-    touching = contact is not None and _acts(contact.torn, at.multiplier)
-    if moved is None or (contact is not None and touching and not _slides(contact.torn, at.multiplier)):
+    touching = _acts(contact.torn, at.multiplier)
+    if moved is None or (touching and not _slides(contact.torn, at.multiplier)):
         return evaluated(at), None
     try:
         there = evaluated(replace(at, displacement=moved))

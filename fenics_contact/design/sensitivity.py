@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._large_deformations.moving_contact import MovedContact
 from fenics_contact._large_deformations.tangent_step import tangent_adjoint
 from fenics_contact._scene.local_axes import free_part
 from fenics_contact.design.adjoint import (
@@ -51,10 +52,9 @@ def by_true_areas(state: State, by_area: np.ndarray) -> dict[str, np.ndarray]:
     x = X + u of its nodes, by mortar also with the master's: with the displacement and the shape alike.
     """
     moved = state.equilibrium.evaluation.contact if isinstance(state, DeformedState) else None
-    points = None if moved is None else moved.points
-    if moved is None or points is None:
+    if not isinstance(moved, MovedContact):
         return {"by_area": by_area}
-    torn = state.torn
+    torn, points = state.torn, moved.points
     by_now, by_before, by_met = points.areas(torn.scene).pulled_back(by_area)
     by_places = points.met_areas_pulled_back(by_met)
     for index in range(len(torn.scene.contacts)):
@@ -107,7 +107,7 @@ def solve_deformed_adjoint(
 
 def _require_differentiable(state: DeformedState) -> None:
     """Reject free rigid surfaces, and friction that needs more than the start of the load step."""
-    torn, points = state.torn, state.equilibrium.evaluation.contact.points
+    torn, contact = state.torn, state.equilibrium.evaluation.contact
     if loose := state.equilibrium.evaluation.load.loose:
         raise InvalidInputError(
             "derivatives of nonlinear scenes need rigid tools and surfaces whose whole motion is prescribed, "
@@ -121,7 +121,7 @@ def _require_differentiable(state: DeformedState) -> None:
             f"load step, here it begins at {state.since:.3g} of it: leave out finer_history=True, or "
             "prescribe less where bodies snap"
         )
-    if points is not None and state.begun is None:
+    if isinstance(contact, MovedContact) and state.begun is None:
         raise InvalidInputError(
             "derivatives of large deformations with friction need the start of the load step, this state was "
             "read from a checkpoint, which does not keep it: solve the scene again"
@@ -138,16 +138,17 @@ def deformed_contact_by_shape(
     areas and friction coefficients are those of the undeformed body.
     """
     torn, contact = state.torn, state.equilibrium.evaluation.contact
-    points = contact.points
     result = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
-    if points is None or points.points.count == 0:
+    if not isinstance(contact, MovedContact) or contact.points.points.count == 0:
         return result
+    points = contact.points
     (normal, friction), (by_gap, by_slip) = (contact.at_points(each) for each in fields.multipliers)
     w = _on_surfaces(torn, points, fields.displacements[0])
     turning, rubbing = points.stiffness(np.maximum(normal, 0.0)), points.friction_stiffness(friction)
     by_nodes = -turning.assembled() @ w - rubbing.right @ (rubbing.left.T @ w) + points.gap_rows.T @ by_gap
     by_nodes += points.means_pulled_back(np.maximum(normal, 0.0), friction, by_gap, w)
-    if by_slip.any() and state.begun is not None and (start := state.begun.points) is not None:
+    if by_slip.any() and isinstance(state.begun, MovedContact):
+        start = state.begun.points
         rows = points.slip_rows(start.material_points()) + points.slip_by_start(start)
         by_nodes -= rows.T @ by_slip.ravel()
     result += by_nodes.reshape(result.shape)

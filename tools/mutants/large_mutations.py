@@ -33,8 +33,8 @@ LARGE_MUTATIONS = (
     Mutation(
         "slip of bodies that move far begins anew in every part of a load step",
         "_large_deformations/moving_contact.py",
-        "(None, None) if last is None else (last.points, last.start)",
-        "(None, None) if last is None else (last.points, last.material_points)",
+        "return self._from(load, displacement, last.points, last.start)",
+        "return self._from(load, displacement, last.points, last.points.material_points())",
         (f"{ONE_STEP}[plane]",),
     ),
     Mutation(

@@ -424,9 +424,9 @@ MUTATIONS = (
     ),
     Mutation(
         "slip of earlier steps does not turn with the master",
-        "_equilibrium/deformed.py",
-        "points.carry_slip(before.contact.total_slip, old)",
-        "points.carry_tangential(before.contact.total_slip, old)",
+        "_large_deformations/moving_contact.py",
+        "points.carry_slip(slip, self.points)",
+        "points.carry_tangential(slip, self.points)",
         (
             "tests/large_deformations/test_prescribed_motion.py::test_slip_of_earlier_steps_turns_about_the_normal",
         ),
