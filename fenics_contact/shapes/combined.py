@@ -47,8 +47,7 @@ class Joined:
         """Reject shapes without facets."""
         if not self.shapes or len(self.shapes) != len(self.facets) or not all(map(len, self.facets)):
             raise InvalidInputError(
-                f"Joined.facets must hold facets for each of the {len(self.shapes)} shapes, got "
-                f"{[len(each) for each in self.facets]}: give the parts of the surface that have the shapes"
+                f"Joined needs facets of each of {len(self.shapes)} shapes, got {[*map(len, self.facets)]}"
             )
 
     def _facts(self) -> dict[str, str]:
@@ -174,18 +173,13 @@ class Placed:
         turn = np.array([[float(entry) for entry in row] for row in self.rotation if len(row) == dim])
         if turn.shape != (dim, dim) or not np.abs(turn @ turn.T - np.eye(dim)).max() <= ORTHOGONAL:
             raise InvalidInputError(
-                f"Placed.rotation must be an orthogonal matrix of shape ({dim}, {dim}), whose rows are "
-                f"perpendicular and of length one, got {self.rotation!r}: give the scale by itself"
+                f"Placed.rotation must be an orthogonal matrix of shape ({dim}, {dim}), got {self.rotation!r}"
             )
         if not (np.isfinite(self.scale) and self.scale > 0):
-            raise InvalidInputError(
-                f"Placed.scale must be a positive number, got {self.scale!r}: to mirror a shape give a "
-                "rotation that mirrors"
-            )
+            raise InvalidInputError(f"Placed.scale must be positive, got {self.scale!r}: mirror by rotation")
         if getattr(self.shape, "dim", dim) != dim:
             raise InvalidInputError(
-                f"Placed.translation must have as many entries as the shape has dimensions, {dim} were given "
-                f"for a {type(self.shape).__name__} in {self.shape.dim}: give {self.shape.dim}"  # type: ignore[attr-defined]
+                f"Placed.translation must have {self.shape.dim} entries as its shape, got {dim}: give them"  # type: ignore[attr-defined]
             )
 
     @property

@@ -60,8 +60,7 @@ class Feet:
         if not (length > FLAT * sizes.max(axis=1, initial=0.0) ** sizes.shape[1]).all():  # also catches NaN
             worst = self.position[int(np.argmin(length))]
             raise InvalidInputError(
-                "a parametrised surface needs derivatives that are not zero and not parallel, got such at "
-                f"{np.round(worst, 6).tolist()}: leave out poles and corners, or describe them otherwise"
+                f"derivatives must not be zero or parallel, got such at {np.round(worst, 6)}: leave out poles"
             )
         return np.asarray((self.sign / length)[:, None] * across)
 
@@ -247,20 +246,17 @@ class Parametric(Patch):
         numbers = count == len(self.upper) and np.isfinite([*self.lower, *self.upper]).all()
         if count not in (1, 2) or not numbers or not np.less(self.lower, self.upper).all():
             raise InvalidInputError(
-                "Parametric.lower must be one or two finite numbers, each below its upper, got "
-                f"{self.lower!r} and {self.upper!r}: give the range of each parameter"
+                f"lower must be one or two numbers below upper, got {self.lower!r} and {self.upper!r}"
             )
         if len(self.periodic) not in (0, count) or self.samples < 3:
             raise InvalidInputError(
-                f"Parametric.periodic must hold {count} booleans and samples be at least 3, got "
-                f"{self.periodic!r} and {self.samples}: one boolean per parameter"
+                f"periodic needs {count} booleans, samples 3 or more, got {self.periodic!r}, {self.samples}"
             )
         starts = self._starts()
         values = np.asarray(self.position(starts), dtype=np.float64)
         if values.shape != (len(starts), count + 1) or not np.isfinite(values).all():
             raise InvalidInputError(
-                f"Parametric.position must return finite numbers of shape {(len(starts), count + 1)} for "
-                f"parameters of shape {starts.shape}, got shape {values.shape} or NaN: one row per point"
+                f"position must return finite numbers of shape {(len(starts), count + 1)}, got {values.shape}"
             )
 
     @property

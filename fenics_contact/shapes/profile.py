@@ -52,8 +52,7 @@ class Profile(Patch):
         known = all(len(point) == 2 for point in self.points) and np.isfinite(self.points).all()
         if len(self.points) < 3 or not known or not self._lengths.all():
             raise InvalidInputError(
-                "Profile.points must be at least three points of two finite numbers, each apart from the "
-                f"next, got {self.points!r}: give them along the curve, of a closed one each once"
+                f"Profile.points must be three or more different points in the plane, got {self.points!r}"
             )
 
     @property

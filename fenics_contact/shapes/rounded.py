@@ -89,10 +89,7 @@ class Cone(AboutAxis):
         require_place(self, self.tip, (3,))
         object.__setattr__(self, "axis", unit_vector(f"{type(self).__name__}.axis", self.axis, 3))
         if not 0.0 < self.half_angle < 0.5 * np.pi:
-            raise InvalidInputError(
-                f"{type(self).__name__}.half_angle must lie between 0 and π/2 = 1.5708, got "
-                f"{self.half_angle!r}: it is measured from the axis, in radians"
-            )
+            raise InvalidInputError(f"half_angle must be from 0 to π/2 in radians, got {self.half_angle!r}")
         _require_not_negative(self, self.radius)
 
     @cached_property
@@ -138,15 +135,11 @@ class Box:
         require_place(self, self.centre)
         fits = len(self.size) == self.dim and np.isfinite(self.size).all() and min(self.size) > 0
         if not fits:
-            raise InvalidInputError(
-                f"{name}.size must be {self.dim} positive numbers, got {self.size!r}: give its length along "
-                "each axis"
-            )
+            raise InvalidInputError(f"{name}.size must be {self.dim} positive numbers, got {self.size!r}")
         _require_not_negative(self, self.radius)
         if self.radius > 0.5 * min(self.size):
             raise InvalidInputError(
-                f"{name}.radius must be at most half of the smallest length, {0.5 * min(self.size):g}, got "
-                f"{self.radius!r}: give a smaller radius, or a Sphere or Cylinder"
+                f"{name}.radius must be at most {0.5 * min(self.size):g}, half the size, got {self.radius!r}"
             )
         turns = () if self.dim == 2 else (3,)
         if self.rotation is not None and (
@@ -154,8 +147,7 @@ class Box:
         ):
             needed = "one finite number" if self.dim == 2 else "three finite numbers"
             raise InvalidInputError(
-                f"{name}.rotation must be {needed}, in radians, got {self.rotation!r}: give a rotation "
-                "vector, or None"
+                f"{name}.rotation must be {needed}, in radians, got {self.rotation!r}: give it, or None"
             )
 
     @property
@@ -208,7 +200,4 @@ class Box:
 
 def _require_not_negative(shape: object, radius: float) -> None:
     if not (np.isfinite(radius) and radius >= 0):
-        raise InvalidInputError(
-            f"{type(shape).__name__}.radius must be zero or positive, got {radius!r}: it rounds tips and "
-            "edges"
-        )
+        raise InvalidInputError(f"{type(shape).__name__}.radius must be at least 0, got {radius!r}")

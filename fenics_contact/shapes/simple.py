@@ -45,8 +45,7 @@ def evaluate_shape(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> n
     if values.shape != needed or not np.isfinite(values).all():
         given = f"shape {values.shape}" if values.shape != needed else "NaN or infinity"
         raise InvalidInputError(
-            f"{name} must be finite numbers of shape {needed} for points of shape {points.shape}, got "
-            f"{given}: it receives all points at once, one row each"
+            f"{name} must be finite numbers of shape {needed}, got {given}: it receives all points at once"
         )
     return values
 
@@ -108,8 +107,7 @@ def require_place(shape: object, point: GivenVector, dims: tuple[int, ...] = (2,
     if len(point) not in dims or not np.all(np.isfinite(point)):
         needed = " or ".join(str(dim) for dim in dims)
         raise InvalidInputError(
-            f"{type(shape).__name__} must be placed by {needed} finite numbers, got {point!r}: give the "
-            "coordinates of a point"
+            f"{type(shape).__name__} must be placed by {needed} finite numbers, got {point!r}"
         )
 
 
@@ -117,8 +115,7 @@ def require_radius(shape: object, radius: float, name: str = "radius") -> None:
     """Reject a radius that is not positive."""
     if not (np.isfinite(radius) and radius > 0):
         raise InvalidInputError(
-            f"{type(shape).__name__}.{name} must be a positive number, got {radius!r}: for a socket or a "
-            "hole give the positive radius and hollow=True"
+            f"{type(shape).__name__}.{name} must be positive, got {radius!r}: for a hole add hollow=True"
         )
 
 
@@ -131,8 +128,7 @@ def require_plane(shape: object, profile: object) -> None:
     """Reject a profile that is a shape in space."""
     if getattr(profile, "dim", 2) != 2:
         raise InvalidInputError(
-            f"{type(shape).__name__}.profile must be a shape in the plane, got a {type(profile).__name__} in "
-            "space: place it by two coordinates"
+            f"{type(shape).__name__}.profile must be a plane shape, got {type(profile).__name__} in space"
         )
 
 
@@ -175,8 +171,7 @@ class Extruded:
         across = across - (across @ axis) * axis
         if np.linalg.norm(across) < 1e-6:
             raise InvalidInputError(
-                f"{name}.across must not be parallel to the axis, got {self.across!r} and {self.axis!r}: "
-                "give the direction of the profile's first coordinate"
+                f"{name}.across must not be parallel to the axis {self.axis!r}, got {self.across!r}: turn it"
             )
         object.__setattr__(self, "axis", floats(axis))
         object.__setattr__(self, "across", unit_vector(f"{name}.across", floats(across), 3))
@@ -473,8 +468,7 @@ class SignedDistance:
         if values.shape != (len(points),) or not np.isfinite(values).all():
             raise InvalidInputError(
                 f"the distance of {type(self).__name__} must be one finite number per point, shape "
-                f"({len(points)},), got shape {values.shape} or NaN: write it for an array of points, "
-                "(n, dim) -> (n,)"
+                f"({len(points)},), got shape {values.shape} or NaN: write it for an array of points"
             )
         return values
 
@@ -489,16 +483,14 @@ class SignedDistance:
         slope = np.asarray(slope, dtype=np.float64)
         if slope.shape != points.shape:
             raise InvalidInputError(
-                f"the gradient of {type(self).__name__} must have shape {points.shape} like the points, got "
-                f"{slope.shape}: write it for an array of points, (n, dim) -> (n, dim)"
+                f"the gradient of {type(self).__name__} must have shape {points.shape}, got {slope.shape}"
             )
         length = np.linalg.norm(slope, axis=1)
         if len(length) and not np.abs(length - 1.0).max() <= SLOPE_TOLERANCE:  # also catches NaN
             worst = int(np.argmax(np.abs(length - 1.0)))
             raise InvalidInputError(
-                f"{type(self).__name__} needs the signed distance to its surface, whose gradient has length "
-                f"one, got {length[worst]:.3g} at {np.round(points[worst], 6).tolist()}: divide a level set "
-                "function by the length of its gradient, or round off edges"
+                f"{type(self).__name__} needs the signed distance, with a gradient of length one, got "
+                f"{length[worst]:.3g} at {np.round(points[worst], 6)}: divide by that, or round edges"
             )
         return np.asarray(slope / length[:, None])
 
@@ -558,11 +550,7 @@ class Torus(AboutAxis):
         require_place(self, self.centre, (3,))
         require_radius(self, self.tube_radius, "tube_radius")
         if not (np.isfinite(self.ring_radius) and self.tube_radius < self.ring_radius):
-            raise InvalidInputError(
-                f"{type(self).__name__}.ring_radius must be a number above the tube_radius "
-                f"{self.tube_radius!r}, got {self.ring_radius!r}: it is measured from the axis to the middle "
-                "of the wire; for a wire without a hole use Sphere or Revolved"
-            )
+            raise InvalidInputError(f"ring_radius must exceed tube_radius, got {self.ring_radius!r}")
 
     @cached_property
     def _revolved(self) -> Revolved:

@@ -60,10 +60,7 @@ class Triangulation:
         """Merge equal points; reject surfaces that are not closed or face inwards."""
         points, triangles = _arrays(self.points, self.triangles)
         if not 0.0 <= self.smooth <= np.pi:
-            raise InvalidInputError(
-                f"Triangulation.smooth must lie between 0 and π, got {self.smooth!r}: it is an angle, in "
-                "radians"
-            )
+            raise InvalidInputError(f"smooth must be an angle from 0 to π in radians, got {self.smooth!r}")
         points, triangles = _merged(points, triangles)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "triangles", triangles)
@@ -257,10 +254,7 @@ class Triangulation:
     def _require_closed(self) -> None:
         """Reject edges of other than two triangles, and neighbours of opposite orientation."""
         if not len(self.triangles):
-            raise InvalidInputError(
-                "Triangulation needs triangles with three different corners, those given have none after "
-                "points within a millionth of its size are joined: correct the coordinates"
-            )
+            raise InvalidInputError("triangles must have three different corners, got none: correct points")
         edges = self.triangles[:, SIDES].reshape(-1, 2)
         low, high = edges.min(axis=1), edges.max(axis=1)
         _, number, count = np.unique(low * len(self.points) + high, return_inverse=True, return_counts=True)
@@ -271,16 +265,14 @@ class Triangulation:
             found = [f"{counted(single, 'open edge')}"] if single else []
             found += [f"{counted(many, 'edge')} of more than two triangles"] if many else []
             raise InvalidInputError(
-                "Triangulation must be closed, each edge belonging to two triangles, got "
-                f"{' and '.join(found)} of {len(count)}, one at ({place}): close the holes in the program "
-                "that wrote it, or remove what lies inside"
+                f"Triangulation must be closed, got {' and '.join(found)} of {len(count)}, one at ({place}): "
+                "close the holes in the program that wrote it, or remove what lies inside"
             )
         turned = np.bincount(number.ravel(), np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0))
         if turned.any():
             raise InvalidInputError(
-                "the triangles of Triangulation must all be counterclockwise seen from outside, got "
-                f"{counted(int(np.count_nonzero(turned)), 'edge')} whose two triangles differ: exchange two "
-                "corners of those that face inwards"
+                f"triangles must be counterclockwise seen from outside, got {np.count_nonzero(turned)} edges "
+                "at which they are not: exchange two corners of those that face inwards"
             )
 
     def _require_outward(self) -> None:
@@ -294,10 +286,8 @@ class Triangulation:
             if round(_winding(place, self._corners[number != piece])) >= 1:
                 continue
             raise InvalidInputError(
-                f"the triangles of Triangulation must face outwards, got "
-                f"{np.count_nonzero(number == piece)} around a volume of {volume[piece]:.6g}: exchange two "
-                "corners of each, as by "
-                "triangles[:, ::-1]"
+                f"triangles must face outwards, got {np.count_nonzero(number == piece)} around a volume of "
+                f"{volume[piece]:.6g}: exchange two corners of each, as by triangles[:, ::-1]"
             )
 
 
@@ -312,8 +302,8 @@ def _arrays(points: Any, triangles: Any) -> tuple[np.ndarray, np.ndarray]:
         fits = False
     if not fits:
         raise InvalidInputError(
-            "Triangulation needs finite points of shape (n, 3) and at least four triangles of shape (m, 3) "
-            f"with numbers of points, got shapes {np.shape(points)} and {np.shape(triangles)}: give arrays"
+            "Triangulation needs finite points (n, 3) and at least four triangles (m, 3) of numbers of "
+            f"points, got shapes {np.shape(points)} and {np.shape(triangles)}: give such arrays"
         )
     return places, corners
 

@@ -49,8 +49,8 @@ def test_files_without_a_body_are_refused(tmp_path: Path, cells: list, scale: fl
 @pytest.mark.parametrize(
     ("far", "message"),
     [
-        (1e200, r"Triangulation needs finite points of shape \(n, 3\)"),
-        (1e12, r"three different corners, those given have none after points within a millionth"),
+        (1e200, r"Triangulation needs finite points \(n, 3\)"),
+        (1e12, r"triangles must have three different corners, got none"),
     ],
 )
 def test_points_that_are_too_far_away_are_refused(tmp_path: Path, far: float, message: str) -> None:

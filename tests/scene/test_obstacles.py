@@ -141,7 +141,7 @@ def test_obstacles_are_recognised_by_their_members() -> None:
     [
         (
             lambda: RigidPlane((0.0,), (1.0,)),
-            r"^RigidPlane must be placed by 2 or 3 finite numbers, got \(0.0,\): give the coordinates of a",
+            r"^RigidPlane must be placed by 2 or 3 finite numbers, got \(0.0,\)",
         ),
         (lambda: RigidPlane((0.0, np.nan), (0.0, 1.0)), "RigidPlane must be placed by 2 or 3 finite numbers"),
         (
@@ -152,10 +152,9 @@ def test_obstacles_are_recognised_by_their_members() -> None:
         (lambda: RigidSphere((0.0, np.inf), 1.0), "RigidSphere must be placed by 2 or 3 finite numbers"),
         (
             lambda: RigidSphere((0.0, 0.0), -1.0),
-            r"^RigidSphere.radius must be a positive number, got -1.0: for a socket or a hole give the "
-            r"positive radius and hollow=True$",
+            r"^RigidSphere.radius must be positive, got -1.0: for a hole add hollow=True$",
         ),
-        (lambda: RigidSphere((0.0, 0.0), np.nan), "RigidSphere.radius must be a positive number, got nan"),
+        (lambda: RigidSphere((0.0, 0.0), np.nan), "RigidSphere.radius must be positive, got nan"),
         (
             lambda: RigidCylinder((0.0, 0.0), (0.0, 0.0, 1.0), 1.0),
             r"^RigidCylinder must be placed by 3 finite numbers, got \(0.0, 0.0\)",
@@ -166,7 +165,7 @@ def test_obstacles_are_recognised_by_their_members() -> None:
         ),
         (
             lambda: RigidCylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0),
-            "RigidCylinder.radius must be a positive number, got 0.0",
+            "RigidCylinder.radius must be positive, got 0.0",
         ),
     ],
 )
@@ -202,8 +201,8 @@ def test_a_level_set_function_that_is_no_distance_is_refused(
 ) -> None:
     level_set = DistanceObstacle(lambda x: np.einsum("nd,nd->n", x, x) - 1.0, gradient)
     message = (
-        r"DistanceObstacle needs the signed distance to its surface, whose gradient has length one, got 3 at "
-        r"\[1.5, 0.0\]: divide a level set function by the length of its gradient, or round off edges"
+        r"DistanceObstacle needs the signed distance, with a gradient of length one, got 3 at "
+        r"\[1.5 0. \]: divide by that, or round edges"
     )
     with pytest.raises(InvalidInputError, match=message):
         level_set.normals(np.array([[1.0, 0.0], [1.5, 0.0]])[1:])

@@ -278,9 +278,7 @@ def test_a_load_must_be_a_vector(name: str, make: Callable[[Any], Any], value: A
     ],
 )
 def test_a_plane_needs_a_direction(point: Any, normal: Any) -> None:
-    message = (
-        r"RigidPlane(\.normal| must be placed by 2 or 3 finite numbers).* got .*: (for a floor|give the)"
-    )
+    message = r"RigidPlane(\.normal| must be placed by 2 or 3 finite numbers).* got "
     with pytest.raises(InvalidInputError, match=message):
         RigidPlane(point, normal)
 

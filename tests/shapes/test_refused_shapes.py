@@ -36,12 +36,12 @@ def circle(u: np.ndarray) -> np.ndarray:
     [
         (
             lambda: Torus(CENTRE, AXIS, 1.0, 1.0),
-            r"^Torus.ring_radius must be a number above the tube_radius 1.0, got 1.0: it is measured from",
+            r"^ring_radius must exceed tube_radius, got 1.0",
         ),
-        (lambda: Torus(CENTRE, AXIS, np.nan, 1.0), "Torus.ring_radius must be a number above"),
+        (lambda: Torus(CENTRE, AXIS, np.nan, 1.0), "ring_radius must exceed tube_radius, got nan"),
         (
             lambda: Torus(CENTRE, AXIS, 1.0, 0.0),
-            "^Torus.tube_radius must be a positive number, got 0.0: for a",
+            "^Torus.tube_radius must be positive, got 0.0: for a hole",
         ),
         (
             lambda: Torus(CENTRE, (0.0, 0.0, 0.0), 2.0, 1.0),
@@ -50,62 +50,68 @@ def circle(u: np.ndarray) -> np.ndarray:
         (lambda: Torus((0.0, 0.0), AXIS, 2.0, 1.0), "^Torus must be placed by 3 finite numbers"),
         (
             lambda: Cone(CENTRE, AXIS, 1.6),
-            "^Cone.half_angle must lie between 0 and π/2 = 1.5708, got 1.6: it is",
+            "^half_angle must be from 0 to π/2 in radians, got 1.6",
         ),
-        (lambda: Cone(CENTRE, AXIS, 1.0, -0.1), "^Cone.radius must be zero or positive, got -0.1"),
+        (lambda: Cone(CENTRE, AXIS, 1.0, -0.1), "^Cone.radius must be at least 0, got -0.1"),
         (lambda: Box(CENTRE, (1.0, 2.0)), r"^Box.size must be 3 positive numbers, got \(1.0, 2.0\)"),
         (lambda: Box(CENTRE, (1.0, 2.0, 0.0)), "^Box.size must be 3 positive numbers"),
         (
             lambda: Box(CENTRE, (1.0, 2.0, 3.0), 0.6),
-            "^Box.radius must be at most half of the smallest length, 0.5, got 0.6: give a smaller",
+            "^Box.radius must be at most 0.5, half the size, got 0.6",
         ),
         (
             lambda: Box(CENTRE, (1.0, 2.0, 3.0), rotation=0.6),
             "^Box.rotation must be three finite numbers, in",
         ),
         (lambda: Box((0.0, 0.0), (1.0, 2.0), rotation=AXIS), "^Box.rotation must be one finite number"),
-        (lambda: Sphere(CENTRE, -1.0), "^Sphere.radius must be a positive number, got -1.0"),
+        (lambda: Sphere(CENTRE, -1.0), "^Sphere.radius must be positive, got -1.0"),
         (
             lambda: Extruded(Sphere((0.0, 0.0), 1.0), CENTRE, AXIS, AXIS),
-            r"^Extruded.across must not be parallel to the axis, got \(1.0, 2.0, -1.0\) and .*: give the",
+            r"^Extruded.across must not be parallel to the axis .*, got \(1.0, 2.0, -1.0\): turn",
         ),
         (
             lambda: Extruded(Sphere(CENTRE, 1.0), CENTRE, AXIS, (1.0, 0.0, 0.0)),
-            "^Extruded.profile must be a shape in the plane, got a Sphere in space: place it by two",
+            "^Extruded.profile must be a plane shape, got Sphere in space",
         ),
         (
             lambda: Revolved(Plane(CENTRE, AXIS), CENTRE, AXIS),
-            "^Revolved.profile must be a shape in the plane",
+            "^Revolved.profile must be a plane shape",
         ),
         (lambda: Revolved("wire", CENTRE, AXIS), "^Revolved.profile must be a SurfaceShape with distance"),
         (
             lambda: placed(Sphere(CENTRE, 1.0), 2.0 * np.eye(3), (0.0, 0.0, 0.0)),
-            r"^Placed.rotation must be an orthogonal matrix of shape \(3, 3\), .*: give the scale by itself",
+            r"^Placed.rotation must be an orthogonal matrix of shape \(3, 3\), got",
         ),
         (lambda: placed(Sphere(CENTRE, 1.0), np.eye(2), (0.0, 0.0, 0.0)), "^Placed.rotation must be an orth"),
         (
             lambda: placed(Sphere(CENTRE, 1.0), None, CENTRE, -1.0),
-            "^Placed.scale must be a positive number, got -1",
+            "^Placed.scale must be positive, got -1.0: mirror",
         ),
         (
             lambda: placed(Sphere((0.0, 0.0), 1.0), None, CENTRE),
-            "^Placed.translation must have as many entries as the shape has dimensions, 3 were given for a",
+            "^Placed.translation must have 2 entries as its shape, got 3",
         ),
-        (lambda: Profile([(0.0, 0.0), (1.0, 0.0)]), "^Profile.points must be at least three points of two"),
-        (lambda: Profile([(0.0, 0.0), (0.0, 0.0), (1.0, 0.0)]), "each apart from the next"),
-        (lambda: Profile([(0.0, 0.0), (1.0, 1.0), (0.0, 0.0)], closed=True), "of a closed one each once"),
+        (lambda: Profile([(0.0, 0.0), (1.0, 0.0)]), "^Profile.points must be three or more different points"),
+        (
+            lambda: Profile([(0.0, 0.0), (0.0, 0.0), (1.0, 0.0)]),
+            r"must be .* different points in the plane, got \[\(0.0, 0.0\), \(0.0",
+        ),
+        (
+            lambda: Profile([(0.0, 0.0), (1.0, 1.0), (0.0, 0.0)], closed=True),
+            r"must be .* different points in the plane, got .* \(0.0, 0.0\)\]$",
+        ),
         (
             lambda: Joined((Plane(CENTRE, AXIS),), ()),
-            r"^Joined.facets must hold facets for each of the 1 shapes",
+            r"^Joined needs facets of each of 1 shapes, got \[\]",
         ),
-        (lambda: Parametric(circle, (1.0,), (0.0,)), "^Parametric.lower must be one or two finite numbers"),
+        (lambda: Parametric(circle, (1.0,), (0.0,)), "^lower must be one or two numbers below upper"),
         (
             lambda: Parametric(circle, (0.0,), (1.0,), periodic=(True, True)),
-            "^Parametric.periodic must hold 1",
+            "^periodic needs 1 booleans, samples 3",
         ),
         (
             lambda: Parametric(lambda u: u, (0.0,), (1.0,)),
-            r"^Parametric.position must return finite numbers of",
+            r"^position must return finite numbers of",
         ),
     ],
 )
@@ -121,9 +127,7 @@ def test_a_pole_of_a_parametrisation_is_refused_where_it_is_met() -> None:
 
     shape = Parametric(ball, (0.0, -np.pi / 2), (2 * np.pi, np.pi / 2), periodic=(True, False))
     np.testing.assert_allclose(shape.distance(np.array([[2.0, 0.0, 0.1]])), np.hypot(2.0, 0.1) - 1)
-    message = (
-        r"a parametrised surface needs derivatives that are not zero and not parallel, got such at \[.*1.0\]"
-    )
+    message = r"derivatives must not be zero or parallel, got such at \[.*1. *\]"
     with pytest.raises(InvalidInputError, match=message):
         shape.normals(np.array([[0.0, 0.0, 2.0]]))
 
@@ -136,9 +140,7 @@ def test_an_answer_of_another_shape_is_refused_and_an_error_is_named() -> None:
     def fails(x: np.ndarray) -> np.ndarray:
         raise ZeroDivisionError
 
-    message = (
-        r"^the curvatures of Wrong must be finite numbers of shape \(4, 2, 2\) for points of shape \(4, 2\)"
-    )
+    message = r"^the curvatures of Wrong must be finite numbers of shape \(4, 2, 2\), got shape \(3,\)"
     with pytest.raises(InvalidInputError, match=message):
         evaluate_shape(Wrong(lambda x: x[:, 0]), "curvatures", np.ones((4, 2)))
     with pytest.raises(UserCodeError, match="the distance of SignedDistance"):
