@@ -31,10 +31,15 @@ def require_room(*counts: int) -> None:
     needed, there = cells * BYTES_A_CELL[len(counts)], memory()
     if needed > there:
         raise InvalidInputError(
-            f"a mesh must fit into the memory of this machine, {there / 1e9:.3g} GB, got "
-            f"{' x '.join(map(str, counts))} cells, which take {_size(needed)} while they are built: take "
-            "fewer cells"
+            f"a mesh must fit into the memory, {there / 1e9:.3g} GB, got {' x '.join(map(str, counts))} "
+            f"cells, which take {_size(needed)} while they are built: take fewer"
         )
+
+
+def require_cells(what: str, mesh: BodyMesh, kind: str, name: str) -> None:
+    """Reject a mesh of cells of another type."""
+    if mesh.cell_type != kind:
+        raise InvalidInputError(f"{what} needs {name}, got cells of type {mesh.cell_type}: mesh with {name}")
 
 
 def memory() -> int:
@@ -110,18 +115,13 @@ def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyM
     whole layers of cells are mirrored. `mirrored`: (n_cells, 3) bool: whether the diagonal is mirrored in
     each local direction; nowhere unless given.
     """
-    if mesh.cell_type != "hexahedron":
-        raise InvalidInputError(
-            f"split_hexahedra needs hexahedra, got cells of type {mesh.cell_type}: give it a mesh of "
-            "hexahedra (`split_quadrilaterals` splits those of two dimensions)"
-        )
+    require_cells("split_hexahedra", mesh, "hexahedron", "hexahedra")
     cells = _split_cells(mesh.cells, mirrored)
     grid = None if mesh.grid is None else np.repeat(mesh.grid, KUHN_TETRAHEDRA.shape[0], axis=0)
     boundary, _ = boundary_faces(cells)
     if boundary.shape[0] != 2 * boundary_faces(mesh.cells)[0].shape[0]:
         raise InvalidInputError(
-            "hexahedra must be numbered alike to be split, some neighbours' diagonals do not meet: build "
-            "them with `structured_cells`, or mesh with tetrahedra from the start"
+            "neighbouring hexahedra must be split alike, their diagonals do not meet: use structured_cells"
         )
     surfaces = {
         name: orient(cells, _split_facets(facets, boundary)) for name, facets in mesh.surfaces.items()
@@ -208,9 +208,7 @@ def checked_counts(counts: Sequence[int], axes: str) -> list[int]:
     known = np.ndim(counts) == 1 or isinstance(counts, str)
     if not known or len(counts) != len(axes):
         number = "three" if len(axes) == 3 else "two"
-        raise InvalidInputError(
-            f"counts must be {number} integers, got {brief(counts)}: give one for each of {_listed(axes)}"
-        )
+        raise InvalidInputError(f"counts must be {number} integers, got {brief(counts)}: for {_listed(axes)}")
     for direction, count in enumerate(counts):
         check_count(count, f"counts[{direction}]")
     require_room(*counts)
@@ -230,8 +228,7 @@ def checked_ticks(
     check_row(grading, "grading", len(axes))
     if max(map(abs, grading)) > STEEPEST:
         raise InvalidInputError(
-            f"grading must lie between {-STEEPEST:g} and {STEEPEST:g}, got {brief(grading)}: 0 gives equal "
-            "cells, 3 makes the smallest 20 times smaller than the largest"
+            f"grading must lie between {-STEEPEST:g} and {STEEPEST:g}, got {brief(grading)}: 0 is uniform"
         )
     return [_ticks(*each) for each in zip(low, high, whole, grading, strict=True)]
 
@@ -295,20 +292,13 @@ def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None 
     present and its neighbour is not, are in no surface. The section's regions and the shapes of its curves
     are swept, too. No grid.
     """
-    if section.cell_type != "quadrilateral":
-        raise InvalidInputError(
-            f"extrude needs a section of quadrilaterals, got cells of type {section.cell_type}: mesh the "
-            "plane with quadrilaterals"
-        )
+    require_cells("extrude", section, "quadrilateral", "quadrilaterals")
     try:
         z = np.asarray(heights, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         z = np.zeros(0)
     if z.ndim != 1 or z.size < 2 or not np.all(np.diff(z) > 0):
-        raise InvalidInputError(
-            f"heights must be at least two ascending numbers, got {brief(heights)}: give the z of every "
-            "plane between layers, and of both ends"
-        )
+        raise InvalidInputError(f"heights must be at least two ascending numbers, got {brief(heights)}")
     require_room(section.n_cells, z.size - 1, 1)
     there = _checked_presence(present, (z.size - 1, section.n_cells))
     layer, cell = np.nonzero(there)
@@ -334,8 +324,7 @@ def _checked_presence(present: ArrayLike | None, shape: tuple[int, int]) -> np.n
     there = np.asarray(present, dtype=bool)
     if there.shape != shape or not there.any():
         raise InvalidInputError(
-            f"present must have shape {shape}, one row per layer and one column per cell of the section, and "
-            f"hold some cell, got shape {there.shape}: say for each layer which cells are there"
+            f"present must have shape {shape} (layers, cells) and hold some cell, got {there.shape}: mark it"
         )
     return there
 
@@ -410,11 +399,7 @@ def split_quadrilaterals(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> 
     `mirrored`: (n_cells,) bool: whether the diagonal runs from vertex 1 to vertex 3 and not from vertex 0 to
     vertex 2; nowhere unless given.
     """
-    if mesh.cell_type != "quadrilateral":
-        raise InvalidInputError(
-            f"split_quadrilaterals needs quadrilaterals, got cells of type {mesh.cell_type}: give it a mesh "
-            "of quadrilaterals (`split_hexahedra` splits those of three dimensions)"
-        )
+    require_cells("split_quadrilaterals", mesh, "quadrilateral", "quadrilaterals")
     cells = mesh.cells
     if mirrored is not None:
         cells = np.where(mirrored[:, None], np.roll(cells, -1, axis=1), cells)
@@ -445,8 +430,7 @@ def growing_ticks(length: float, first: float, ratio: float) -> np.ndarray:
     check_numbers(length=length, first=first, ratio=ratio)
     if min(length, first) <= 0.0 or ratio <= 1.0:
         raise InvalidInputError(
-            f"length and first must be positive and ratio greater than 1, got {length}, {first} and {ratio}: "
-            "for cells of one length take numpy.linspace"
+            f"length, first > 0 and ratio > 1 are needed, got {length}, {first} and {ratio}: or use linspace"
         )
     count = int(np.ceil(np.log1p(length * (ratio - 1.0) / first) / np.log(ratio)))
     require_room(count, 1)

@@ -50,9 +50,7 @@ def drilled_plate(
     left, right = ends
     if not (0 < hole < half_width and left <= -half_width and half_width <= right):
         raise InvalidInputError(
-            "a drilled plate needs 0 < hole < half_width and ends beyond the square around the hole, got "
-            f"hole {hole}, half_width {half_width} and ends {tuple(ends)}: make the plate wider or longer, "
-            "or the hole smaller"
+            f"0 < hole < half_width < ends are needed, got {hole}, {half_width} and {tuple(ends)}: correct it"
         )
     circle, square = _half_turn(n)
     parts = [_rings(hole * circle, half_width * square, n_radial)]
@@ -107,8 +105,8 @@ def bolt(
         check_count(count, name)
     if not (0 < shank < head and grip[0] < grip[1] and head_height > 0):
         raise InvalidInputError(
-            "a bolt needs 0 < shank < head, an ascending grip and a positive head_height, got shank "
-            f"{shank}, head {head}, grip {tuple(grip)} and head_height {head_height}: correct the sizes"
+            f"0 < shank < head, an ascending grip and head_height > 0 are needed, got {shank}, {head}, "
+            f"{tuple(grip)} and {head_height}: correct the sizes"
         )
     along = np.linspace(*grip, layers[0] + 1)
     above = grip[1] + np.linspace(0, head_height, layers[1] + 1)[1:]

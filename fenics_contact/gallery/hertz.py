@@ -173,9 +173,7 @@ def _check(radius: float, n: int, grading: float, symmetry: str, known: tuple[st
     if not 0.0 < radius < np.inf:
         raise InvalidInputError(f"radius must be positive, got {radius}: give the radius of the body")
     if not isinstance(symmetry, str) or symmetry not in known:
-        raise InvalidInputError(
-            f"symmetry must be one of {known}, got {symmetry!r}: name the planes at which the body is cut"
-        )
+        raise InvalidInputError(f"symmetry must be one of {known}, got {symmetry!r}: name the planes")
 
 
 def half_disc(radius: float, n: int, *, symmetry: str = "x", grading: float = 3.0) -> BodyMesh:

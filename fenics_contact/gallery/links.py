@@ -194,10 +194,7 @@ def check_gap(gap: float) -> None:
     """Reject an invalid clearance."""
     check_numbers(gap=gap)
     if gap < 0.0:
-        raise InvalidInputError(
-            f"gap must be zero or positive, got {gap}: links that overlap before anything is loaded press "
-            "each other apart"
-        )
+        raise InvalidInputError(f"gap must not be negative, got {gap}: loaded links would overlap")
 
 
 def check_fit(first: LinkShape, second: LinkShape, names: tuple[str, str] = ("link 1", "link 2")) -> None:
@@ -205,16 +202,14 @@ def check_fit(first: LinkShape, second: LinkShape, names: tuple[str, str] = ("li
     for wire, ring, one, two in ((first, second, *names), (second, first, *names[::-1])):
         if wire.width >= 2.0 * ring.inner_radius or wire.thickness >= ring.opening:
             raise InvalidInputError(
-                f"the wire of {one} must pass through the opening of {two}, got a wire {wire.width:g} wide "
-                f"and {wire.thickness:g} thick for an opening {2.0 * ring.inner_radius:g} wide and "
-                f"{ring.opening:g} long: make the wire thinner, or inner_radius or straight of {two} larger"
+                f"the wire of {one} must pass through the opening of {two}, got {wire.width:g} x "
+                f"{wire.thickness:g} for {2.0 * ring.inner_radius:g} x {ring.opening:g}: thin the wire"
             )
         radius = wire.section.crown_radius
         if radius >= ring.inner_radius:
             raise InvalidInputError(
-                "links touch at one spot only if the radius across the wire is below the other link's "
-                f"inner_radius, got {radius:.6g} for {one} against {ring.inner_radius:.6g} for {two}: make "
-                "inner_radius larger, the wire narrower or roundness closer to 1"
+                f"inner_radius of {two} must exceed the radius across the wire of {one}, got "
+                f"{ring.inner_radius:.6g} and {radius:.6g}: enlarge it, or take roundness closer to 1"
             )
 
 
@@ -259,10 +254,7 @@ def chain(shapes: Sequence[LinkShape], *, gap: float = 0.0) -> Chain:
         (5, 4)
     """
     if len(shapes) < 2:
-        raise InvalidInputError(
-            f"a chain needs at least two links, got {len(shapes)}: give the shape of every link, such as "
-            "[LinkShape()] * 5"
-        )
+        raise InvalidInputError(f"a chain needs two or more links, got {len(shapes)}: give all shapes")
     for number, (one, other) in enumerate(pairwise(shapes), 1):
         check_fit(one, other, (f"link {number}", f"link {number + 1}"))
     longest = max(shapes, key=lambda shape: shape.n_around)

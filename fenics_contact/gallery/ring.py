@@ -85,18 +85,14 @@ class WireSection:
         check_numbers(thickness=self.thickness, width=self.width, roundness=self.roundness)
         if not (0.0 < self.thickness and 0.0 < self.width):
             raise InvalidInputError(
-                f"thickness and width must be positive, got {self.thickness} and {self.width}: give the size "
-                "of the wire in both directions"
+                f"thickness and width must be positive, got {self.thickness} and {self.width}: correct them"
             )
         if not 0.0 < self.roundness < 1.0:
-            raise InvalidInputError(
-                "roundness must lie between 0 (square) and 1 (disc, whose corner cells are flat), got "
-                f"{self.roundness}: take for example 0.9"
-            )
+            raise InvalidInputError(f"roundness must lie between 0 and 1, got {self.roundness}: take 0.9")
         if min(self.corner) <= 0.0:
             raise InvalidInputError(
                 f"a section {self.thickness} thick and {self.width} wide is too slender for roundness "
-                f"{self.roundness}: lower the roundness or bring thickness and width closer together"
+                f"{self.roundness}: lower that, or bring thickness and width closer"
             )
 
     @property
@@ -201,15 +197,11 @@ class LinkShape:
         check_numbers(**{name: getattr(self, name) for name in sizes})
         for name in ("inner_radius", "straight"):
             if getattr(self, name) <= 0.0:
-                raise InvalidInputError(
-                    f"{name} must be positive, got {getattr(self, name)}: a link has two half circles and "
-                    "two legs"
-                )
+                raise InvalidInputError(f"{name} must be positive, got {getattr(self, name)}: enlarge it")
         check_count(self.n_around, "n_around", 12)
         if self.n_around % 6:
             raise InvalidInputError(
-                "n_around must be a multiple of 6 (four quarter turns and two legs with equally many "
-                f"cells), got {self.n_around}: take {6 * max(2, round(self.n_around / 6))}"
+                f"n_around must be a multiple of 6, got {self.n_around}: take {6 * round(self.n_around / 6)}"
             )
         check_count(self.n_a, "n_a")
         check_count(self.n_b, "n_b", 2)

@@ -192,7 +192,6 @@ def _checked_ticks(radius: float, hole: float, n: int, grading: float) -> np.nda
     check_grading(grading)
     if not 0.0 <= hole < radius < np.inf:
         raise InvalidInputError(
-            f"a round body needs a positive radius and a hole that is smaller, got radius {radius} and hole "
-            f"{hole}: give hole=0 for a solid one"
+            f"0 <= hole < radius is needed, got radius {radius} and hole {hole}: give hole=0 for a solid body"
         )
     return mirrored_ticks(n, grading)

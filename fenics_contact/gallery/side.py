@@ -41,14 +41,12 @@ def side_of(mesh: BodyMesh, surface: str) -> DesignSurface:
         return found
     if mesh.dim == 2:
         raise InvalidInputError(
-            "a design by the name of a curve needs one in one piece with two ends, got "
-            f"{surface!r} of a mesh with {sorted(mesh.surfaces)}: name another one, or name a part of it"
+            f"a design needs a curve in one piece with two ends, got {surface!r} of {sorted(mesh.surfaces)}: "
+            "name another one, or a part of it"
         )
     raise InvalidInputError(
-        "a design by the name of a surface needs one whose nodes form a rectangular grid seen along x, y "
-        f"or z, such as a side of a block, got {surface!r} of a mesh with "
-        f"{sorted(mesh.surfaces)}: name another one, take the crown of a chain link ('contact' in scene "
-        "files), or make a DesignSurface of its nodes, their parameters and directions"
+        f"a design needs a surface whose nodes form a rectangular grid along x, y or z, got {surface!r} of "
+        f"{sorted(mesh.surfaces)}: name another, such as a side of a block, or make a DesignSurface"
     )
 
 

@@ -117,7 +117,7 @@ def test_a_disc_pressed_into_a_ring_has_the_pressure_of_lame(discretisation: str
 @pytest.mark.parametrize(("radius", "hole"), [(0.0, 0.0), (1.0, 1.0), (1.0, -0.5), (float("inf"), 0.0)])
 def test_a_hole_must_leave_something(radius: float, hole: float) -> None:
     for build in (disc, ball):
-        with pytest.raises(InvalidInputError, match=r"round body needs a positive radius|finite"):
+        with pytest.raises(InvalidInputError, match=r"0 <= hole < radius is needed, got|finite"):
             build(radius, 3, hole=hole)
     with pytest.raises(InvalidInputError, match="length must be positive, got -1"):
         cylinder(1.0, -1.0, 3, 2)
