@@ -19,7 +19,7 @@ from fenics_contact._pairing.inside import (
     deepest_points,
     points_inside,
 )
-from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._surfaces.facets import corner_places, edge_distance
 from fenics_contact.errors import together
@@ -178,15 +178,8 @@ def _near(state: State, inside: InsideOf, number: int) -> np.ndarray:
     gap = np.full(len(inside.nodes), np.inf)
     gap[place] = contact.gap[mine]
     lowest = gap[slave.facets].min(axis=1)
-    if inside.master is None:  # its features may be finer than cells
-        return np.flatnonzero(lowest <= inside.sizes)
-    assert isinstance(inside.pair.master, Surface)
-    every = np.zeros((inside.numbers.n_nodes, inside.scene.dim))
-    every[inside.numbers.global_nodes(inside.pair.master.body, inside.master.nodes)] = inside.master.normals
-    normals = np.full(slave.points.shape, np.nan)
-    normals[place] = contact.points.master[mine] @ every
     # A parabola that turns by an angle over its width is an eighth of the product deep, twice in space.
-    deep = 0.5 * inside.sizes * inside.turning(normals)
+    deep = 0.5 * inside.sizes * inside.master.turning(slave, place, contact.points.master[mine])
     return np.flatnonzero(lowest <= deep)
 
 
@@ -195,12 +188,11 @@ def _displaced(state: State, inside: InsideOf, facets: np.ndarray) -> np.ndarray
 
     Zero at other nodes, and where bodies are measured where they are.
     """
-    nodes, master = [np.zeros(0, dtype=np.int64)], inside.pair.master
+    nodes, numbers = [np.zeros(0, dtype=np.int64)], NodeNumbers.of(state.scene)
     if len(facets) and not state.scene.deforms_much:
-        other = master.body if isinstance(master, Surface) else getattr(master, "name", "")
-        for name in {inside.pair.slave.body, other} & set(state.scene.bodies):
+        for name in {inside.master.pair.slave.body} | inside.master.bodies:
             count = state.scene.bodies[name].mesh.n_nodes
-            nodes.append(inside.numbers.global_nodes(name, np.arange(count)))
+            nodes.append(numbers.global_nodes(name, np.arange(count)))
     return displaced_at(state, np.unique(np.concatenate(nodes)))
 
 

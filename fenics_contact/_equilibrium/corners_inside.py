@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_contact._equilibrium.between_nodes import displaced_at, least_depth, where_they_are
 from fenics_contact._pairing.inside import InsideOf
+from fenics_contact._pairing.masters import BodyMaster
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import sharp_at
 from fenics_contact._surfaces.corners import corners_over
@@ -46,10 +47,9 @@ class _Corners:
             return None
         sides = where_they_are(state, InsideOf.of(scene, pair), number)
         master = sides.master
-        assert master is not None
-        nodes = sides.nodes, sides.numbers.global_nodes(pair.master.body, master.nodes)
-        node, hit = corners_over(master, sharp, sides.slave)
-        return cls(sides, master, nodes, node, hit) if len(node) else None
+        assert isinstance(master, BodyMaster)
+        node, hit = corners_over(master.surface, sharp, sides.slave)
+        return cls(sides, master.surface, (sides.nodes, master.nodes), node, hit) if len(node) else None
 
     def followed(self, moved: np.ndarray) -> np.ndarray:
         """Return how far corners move against the slave, from displacements of all nodes, (n, dim)."""

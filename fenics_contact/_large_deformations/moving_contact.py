@@ -483,7 +483,7 @@ class MovedContact(ContactConfiguration):
         return self.points.stored(self.start)
 
     def where_they_are(self, undeformed: InsideOf, number: int) -> InsideOf:
-        return undeformed.moved(self.points.coordinates, self.points.placements[number])
+        return undeformed.moved(number, self.points.coordinates, self.points.placements)
 
     def _with_contact_rows(self, values: Vector, normal: np.ndarray, tangential: np.ndarray) -> Vector:
         """Write values at points into the contact rows of a vector, and return it."""

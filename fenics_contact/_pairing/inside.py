@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact._base.checks import floats
 from fenics_contact._pairing.following import followed_nodes
+from fenics_contact._pairing.masters import Master, Placements, master_of
 from fenics_contact._pairing.points import (
     ContactPoints,
     NodeNumbers,
@@ -24,11 +25,9 @@ from fenics_contact._pairing.points import (
     tangent_frames,
 )
 from fenics_contact._scene.local_axes import LocalAxes
-from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
-from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import (
     FacetedSurface,
     corner_places,
@@ -37,9 +36,7 @@ from fenics_contact._surfaces.facets import (
     outside,
 )
 from fenics_contact._surfaces.pieces import shape_weights
-from fenics_contact._surfaces.projection import interpolated_normal, node_weights, project
-from fenics_contact.shapes.combined import placed
-from fenics_contact.shapes.simple import SurfaceShape, evaluate_shape
+from fenics_contact._surfaces.projection import interpolated_normal
 
 #: Gaps at points of facets: numbers of facets, (n,), local coordinates, (n, dim − 1) -> (n,), [length].
 GapsAt = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -175,45 +172,31 @@ class InsideOf:
 
     Attributes:
         nodes: Nodes of the slave among those of all bodies, shape (n_slave,).
-        master: The surface of another body; None on an obstacle.
-        obstacle: The obstacle where it is; None for a body.
     """
 
     scene: Scene
-    pair: ContactPair
     slave: FacetedSurface
     nodes: np.ndarray
-    master: FacetedSurface | None
-    obstacle: SurfaceShape | None
-    numbers: NodeNumbers
+    master: Master
 
     @classmethod
     def of(cls, scene: Scene, pair: ContactPair) -> InsideOf:
         """Return those of a pair of a scene."""
-        slave, numbers = surface_of(scene, pair.slave, pair.slave_geometry), NodeNumbers.of(scene)
-        nodes = numbers.global_nodes(pair.slave.body, slave.nodes)
-        if isinstance(pair.master, Surface):
-            master = surface_of(scene, pair.master, pair.geometry)
-            return cls(scene, pair, slave, nodes, master, None, numbers)
-        return cls(scene, pair, slave, nodes, None, pair.master, numbers)
+        slave = surface_of(scene, pair.slave, pair.slave_geometry)
+        nodes = NodeNumbers.of(scene).global_nodes(pair.slave.body, slave.nodes)
+        return cls(
+            scene, slave, nodes, master_of(scene, pair, partial(surface_of, scene, geometry=pair.geometry))
+        )
 
-    def moved(self, coordinates: np.ndarray, placement: tuple[np.ndarray, np.ndarray] | None) -> InsideOf:
+    def moved(self, number: int, coordinates: np.ndarray, placements: Placements) -> InsideOf:
         """Return them where bodies are that deform much, made of their facets.
 
-        `coordinates`: of all nodes, shape (n_nodes, dim), [length]; `placement`: rotation and translation of
-        the obstacle, None where it rests.
+        `number`: of the pair; `coordinates`: of all nodes, shape (n_nodes, dim), [length].
         """
         from fenics_contact._pairing.sliding.closest import moved_surface
 
-        slave = moved_surface(self.slave, coordinates[self.nodes])
-        if isinstance(self.pair.master, Surface):
-            assert self.master is not None
-            nodes = self.numbers.global_nodes(self.pair.master.body, self.master.nodes)
-            return replace(self, slave=slave, master=moved_surface(self.master, coordinates[nodes]))
-        still = self.pair.master
-        still = still.obstacle if isinstance(still, MovingObstacle) else still
-        at = still if placement is None else placed(still, placement[0], floats(placement[1]))
-        return replace(self, slave=slave, obstacle=at)
+        slave, master = moved_surface(self.slave, coordinates[self.nodes]), self.master
+        return replace(self, slave=slave, master=master.moved(number, coordinates, placements))
 
     def at(self, facet: np.ndarray, local: np.ndarray) -> PointsInside:
         """Return points of the slave by facet, shape (n,), and local coordinates, shape (n, dim − 1)."""
@@ -227,48 +210,13 @@ class InsideOf:
             place = np.einsum("nk,nkd->nd", values, slave.points[at_corners])
             place += heights(slave, facet, local).value[:, None] * normal
         row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
-        own = self._on_all(weights, (row, nodes), self.nodes)
-        if self.obstacle is None:
-            return self._on_body(place, normal, own)
-        outward = evaluate_shape(self.obstacle, "normals", place)
-        facing = np.einsum("nd,nd->n", normal, outward) < 0
-        distance = np.where(facing, evaluate_shape(self.obstacle, "distance", place), np.inf)
-        return PointsInside(distance, outward, own, self._on_tool(place))
+        entries = weights.ravel(), (row, self.nodes[nodes].ravel())
+        own = sp.csr_matrix(entries, shape=(len(nodes), len(self.scene.points)))
+        met = self.master.met(place, normal)
+        return PointsInside(met.distance, met.normal, self._following(own), self._following(met.weights))
 
-    def _on_tool(self, place: np.ndarray) -> sp.csr_matrix:
-        """Return the weights of the nodes that carry the motion of a tool, none on other obstacles."""
-        tool = self.pair.master
-        if not isinstance(tool, RigidTool):
-            return sp.csr_matrix((len(place), self.numbers.n_nodes))
-        body = self.scene.bodies[tool.name]
-        assert isinstance(body, ToolBody)
-        weights = body.weights(place)
-        row, node = np.indices(weights.shape)
-        nodes = self.numbers.global_nodes(tool.name, np.arange(body.mesh.n_nodes))
-        return self._on_all(weights, (row.ravel(), node), nodes)
-
-    def _on_body(self, place: np.ndarray, normal: np.ndarray, own: sp.csr_matrix) -> PointsInside:
-        assert self.master is not None
-        assert isinstance(self.pair.master, Surface)
-        hit = project(place, normal, self.master)
-        distance, outward = np.full(len(place), np.inf), -normal
-        distance[hit.point], outward[hit.point] = hit.gap, hit.normal
-        met = node_weights(self.master, hit).tocoo()
-        nodes = self.numbers.global_nodes(self.pair.master.body, self.master.nodes)
-        entries = met.data, (hit.point[met.row], met.col)
-        return PointsInside(distance, outward, own, self._on_all(*entries, nodes, len(place)))
-
-    def _on_all(
-        self,
-        weights: np.ndarray,
-        at: tuple[np.ndarray, np.ndarray],
-        nodes: np.ndarray,
-        count: int | None = None,
-    ) -> sp.csr_matrix:
-        """Return weights at rows and nodes of a surface as rows of all nodes but hanging ones."""
-        row, node = at
-        shape = (len(weights) if count is None else count, self.numbers.n_nodes)
-        rows = sp.csr_matrix((weights.ravel(), (row, nodes[node].ravel())), shape=shape)
+    def _following(self, rows: sp.csr_matrix) -> sp.csr_matrix:
+        """Return weights of nodes as those of all but hanging ones."""
         return (rows @ followed_nodes(self.scene)).tocsr() if self.scene.has_hanging_nodes else rows
 
     def pressed_in(self, facet: np.ndarray, local: np.ndarray, opened_at: GapsAt) -> np.ndarray:
@@ -317,15 +265,6 @@ class InsideOf:
         values = facet_shape_values(local, self.slave.corners)
         off = ~self.slave.mirrored[self.slave.facets[facet]]
         return np.asarray(np.einsum("nk,nkp->np", np.abs(values), off) < ON_PLANE)
-
-    def turning(self, normals: np.ndarray) -> np.ndarray:
-        """Return by how much the surfaces turn against each other over each facet, shape (n_facets,).
-
-        `normals`: of the master at the slave's nodes, NaN where these do not meet it, (n_slave, dim).
-        """
-        tilt = (self.slave.normals + normals)[self.slave.facets]
-        apart = np.linalg.norm(tilt[:, :, None] - tilt[:, None], axis=3)
-        return np.asarray(np.nan_to_num(apart).max(axis=(1, 2)))
 
     @property
     def sizes(self) -> np.ndarray:

@@ -9,30 +9,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle
+from fenics_contact._pairing.masters import Master
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._surfaces.facets import FacetedSurface
-from fenics_contact._surfaces.projection import project
-from fenics_contact.shapes.simple import evaluate_shape
 
 #: Sine of the angle, about 2°, by which a gap must open.
 OPENING = 0.035
 
 
-def carrying(pair: ContactPair, slave: FacetedSurface, master: FacetedSurface | RigidObstacle) -> np.ndarray:
+def carrying(pair: ContactPair, slave: FacetedSurface, master: Master) -> np.ndarray:
     """Return which nodes of the undeformed slave of a pair may carry a point, shape (len(slave.nodes),)."""
     areas, (end, middle) = slave.areas > 0.0, slave.discs
     if not len(end) or pair.closure is not None or pair.fluid is not None:  # these act by area
         return areas
-    places, normals = slave.points[middle], slave.normals[middle]
-    across = np.zeros_like(places)
-    if isinstance(master, FacetedSurface):
-        hit = project(places, normals, master)
-        across[hit.point] = hit.normal
-    else:
-        shape = master.obstacle if isinstance(master, MovingObstacle) else master
-        across = evaluate_shape(shape, "normals", places)
-    away = places - slave.points[end]
+    places = slave.points[middle]
+    across, away = master.normals_at(places, slave.normals[middle]), places - slave.points[end]
     opening = np.einsum("nd,nd->n", away, across) / np.linalg.norm(away, axis=1)
     areas[end[opening > OPENING]] = True
     return areas

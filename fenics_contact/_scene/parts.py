@@ -416,9 +416,11 @@ def surface_of(
     return continued(found, neighbours, order=3 if finer and geometry != "faceted" else 2)
 
 
-def slave_of(scene: SceneParts, pair: ContactPair | AnyTie, geometry: Geometry) -> FacetedSurface:
+def slave_of(
+    scene: SceneParts, pair: ContactPair | AnyTie, geometry: Geometry, *, finer: bool = False
+) -> FacetedSurface:
     """Return the slave of a pair, as `surface_of`; by mortar with the areas of the pieces of its facets."""
-    surface = surface_of(scene, pair.slave, geometry)
+    surface = surface_of(scene, pair.slave, geometry, finer=finer)
     return as_mortar_slave(scene, pair.slave, surface) if pair.discretisation == "mortar" else surface
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.mortar.points import MortarPoints
 from fenics_contact._pairing.points import HELD, ContactPoints
-from fenics_contact._pairing.search import MortarPoints
 from fenics_contact._scene.fields import gradients_of
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share

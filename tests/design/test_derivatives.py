@@ -13,8 +13,8 @@ from mpi4py import MPI
 
 from fenics_contact import BodyMesh, SurfaceDesign
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.mortar.points import MortarPoints
 from fenics_contact._pairing.points import tangent_frames
-from fenics_contact._pairing.search import MortarPoints
 from fenics_contact._surfaces.facets import (
     FacetedSurface,
     Relief,

@@ -18,8 +18,8 @@ from fenics_contact import (
     Traction,
     solve_scene,
 )
+from fenics_contact._pairing.mortar.points import MortarPoints
 from fenics_contact._pairing.points import ContactPoints
-from fenics_contact._pairing.search import MortarPoints
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain

@@ -17,6 +17,8 @@ from fenics_contact import (
     Surface,
 )
 from fenics_contact._pairing.inside import Deepest, GapsAt, InFacets, InsideOf, deepest_points, points_inside
+from fenics_contact._pairing.masters import turning
+from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._pairing.search import find_contact_points
 from fenics_contact._scene.local_axes import NO_AXES
 from fenics_contact.gallery import block, half_disc, rectangle
@@ -87,7 +89,7 @@ def test_gaps_on_a_tool_change_with_the_motions_of_body_and_tool() -> None:
     gradient = RNG.normal(size=(3, 3))
     turn, shift = RNG.normal(size=3), RNG.normal(size=3)
     moved = nodes @ gradient.T
-    own = of.numbers.global_nodes("tool", np.arange(of.scene.bodies["tool"].mesh.n_nodes))
+    own = NodeNumbers.of(of.scene).global_nodes("tool", np.arange(of.scene.bodies["tool"].mesh.n_nodes))
     moved[own] = np.cross(turn, nodes[own] - tool.at) + shift
     tool_moves = np.cross(turn, places - tool.at) + shift
     closing = np.einsum("nd,nd->n", points.normal, places @ gradient.T - tool_moves)
@@ -189,9 +191,8 @@ def test_facets_turn_as_far_as_normals_at_their_nodes_differ() -> None:
     end = int(np.argmax(of.slave.points[:, 0]))
     normals[end] = np.sin(angle), np.cos(angle)
     last = (of.slave.facets == end).any(axis=1)
-    np.testing.assert_allclose(
-        of.turning(normals), np.where(last, 2.0 * np.sin(0.5 * angle), 0.0), atol=1e-12
-    )
+    expected = np.where(last, 2.0 * np.sin(0.5 * angle), 0.0)
+    np.testing.assert_allclose(turning(of.slave, normals), expected, atol=1e-12)
 
 
 def test_points_inside_facets_lie_in_the_master_by_their_reliefs_and_slide_across_their_normals() -> None:

@@ -31,7 +31,7 @@ def shaken_patches(kind: str, order: int) -> tuple[SmoothPatches, np.ndarray]:
     """Return the patches of an arch and its nodes out of shape, unevenly."""
     scene = on_arch(kind, master_cells=8 // order, order=order)
     meeting = on_patches(sliding(scene))
-    x = shaken(scene)[meeting.master_nodes]
+    x = shaken(scene)[meeting.master.nodes]
     return meeting.patches, x + 0.03 * np.sin(9.0 * x[:, ::-1]) * np.cos(7.0 * x)
 
 

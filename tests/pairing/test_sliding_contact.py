@@ -65,7 +65,7 @@ def slid_over(kind: str, cells: int, geometry: str = "best") -> tuple[Projection
     """Slide a node along an arched master: closest points, and the true normals of the cylinder."""
     meeting = on_patches(sliding(on_arch(kind, master_cells=cells, geometry=geometry)))
     scene = on_arch(kind, master_cells=cells)
-    points, patches = scene.points[meeting.master_nodes], meeting.patches
+    points, patches = scene.points[meeting.master.nodes], meeting.patches
     path = np.linspace(-0.5, 0.5, 1001)
     way = np.zeros((len(path), scene.dim))
     way[:, 0] = path
@@ -168,7 +168,7 @@ def test_a_node_between_two_facets_does_not_change_sides_for_ever() -> None:
     scene = on_arch("quadrilateral")
     contact, x = sliding(scene), scene.points.copy()
     meeting = on_patches(contact)
-    ridge = meeting.master_nodes[np.argmax(x[meeting.master_nodes, 1])]
+    ridge = meeting.master.nodes[np.argmax(x[meeting.master.nodes, 1])]
     slave = meeting.nodes[2]
     sides: dict[bool, set[int]] = {True: set(), False: set()}
     now = None
@@ -530,7 +530,7 @@ def test_what_sticks_to_a_stretched_master_does_not_slip() -> None:
     scene = on_arch("tetrahedron")
     contact, x = sliding(scene), scene.points.copy()
     now = contact.at(x)
-    start, low = now.material_points(), on_patches(contact).master_nodes
+    start, low = now.material_points(), on_patches(contact).master.nodes
     x[low, 0] *= 1.2
     feet = now.points.master @ x
     x[now.points.slave] = feet + 0.01 * now.points.normal

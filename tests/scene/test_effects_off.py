@@ -30,8 +30,8 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact._equilibrium import static_admissibility
-from fenics_contact._pairing import search as contact_search
-from fenics_contact._pairing.mortar import coupling as mortar
+from fenics_contact._pairing import masters
+from fenics_contact._pairing.mortar import points as mortar
 from fenics_contact.feti import TornSystem, dual
 from fenics_contact.feti import torn as initial_gap
 from fenics_contact.gallery import block
@@ -50,7 +50,7 @@ PARTS: dict[str, tuple[Any, str]] = {
     "search for contact": (initial_gap, "find_contact_points"),
     "check of overlap": (initial_gap, "check_no_penetration"),
     "search for ties": (initial_gap, "find_tied_points"),
-    "projection on facets": (contact_search, "_by_projection"),
+    "projection on facets": (masters, "_by_projection"),
     "mortar": (mortar, "mortar_coupling"),
     "balance of floating bodies": (static_admissibility, "_check_balance"),
     "slip bounds that follow": (slip_law.CoulombLaw, "bound"),

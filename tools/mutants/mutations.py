@@ -50,7 +50,7 @@ MUTATIONS = (
     ),
     Mutation(
         "bodies overlap by mortar where a surface turns away from the other one",
-        "_pairing/search.py",
+        "_pairing/mortar/points.py",
         "nodal = creased & (value < ",
         "nodal = creased & (np.inf < ",
         ("tests/design/test_derivatives.py::test_bodies_that_only_touch_do_not_overlap_at_creases",),
@@ -95,9 +95,9 @@ MUTATIONS = (
     ),
     Mutation(
         "gaps to rigid obstacles are forgotten",
-        "_pairing/search.py",
-        'gap = evaluate_shape(obstacle, "distance", slave.surface.points[chosen])',
-        'gap = 0.0 * evaluate_shape(obstacle, "distance", slave.surface.points[chosen])',
+        "_pairing/masters.py",
+        'gap = evaluate_shape(self.shape, "distance", surface.points[chosen])',
+        'gap = 0.0 * evaluate_shape(self.shape, "distance", surface.points[chosen])',
         ("tests/equilibrium/test_obstacles.py::test_nodes_lie_outside_of_the_round_obstacle_after_pressing",),
     ),
     Mutation(
@@ -417,7 +417,7 @@ MUTATIONS = (
     ),
     Mutation(
         "closable gaps take lost counterparts for zero",
-        "_pairing/search.py",
+        "_pairing/mortar/points.py",
         "np.where(lost, own, weight @ opposite)",
         "weight @ opposite",
         ("tests/design/test_derivatives.py::test_gaps_are_closable_from_both_sides_and_at_the_rim_means",),

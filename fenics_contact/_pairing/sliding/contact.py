@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.inside import InFacets, InsideOf
+from fenics_contact._pairing.masters import Placements, master_of
 from fenics_contact._pairing.points import (
     ContactPoints,
     NodeNumbers,
@@ -29,7 +31,7 @@ from fenics_contact._pairing.sliding.meeting import (
     require_inside,
     shared_once,
 )
-from fenics_contact._pairing.sliding.obstacles import OnMovingObstacle, OnObstacle
+from fenics_contact._pairing.sliding.obstacles import OnObstacle
 from fenics_contact._pairing.sliding.points import SlidingPoints, with_given_offsets
 from fenics_contact._pairing.sliding.slip import LastPoints, MaterialPoints
 from fenics_contact._pairing.sliding.stiffness import join_differentials
@@ -37,13 +39,13 @@ from fenics_contact._pairing.sliding.surfaces import OnMeans, OnOwnBody, OnPatch
 from fenics_contact._pairing.sliding.tools import OnTool
 from fenics_contact._pairing.tips import carrying
 from fenics_contact._scene.local_axes import NO_AXES, LocalAxes
-from fenics_contact._scene.parts import slave_of
+from fenics_contact._scene.parts import slave_of, surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.touching import may_touch
 from fenics_contact.errors import InvalidInputError, together
 
 #: Kinds of counterparts of nodes that move far, the first that serves a pair has it.
-KINDS: tuple[type[SlidingPair], ...] = (OnOwnBody, OnMeans, OnPatches, OnTool, OnMovingObstacle, OnObstacle)
+KINDS: tuple[type[SlidingPair], ...] = (OnOwnBody, OnMeans, OnPatches, OnTool, OnObstacle)
 
 
 @dataclass(frozen=True)
@@ -142,18 +144,20 @@ class SlidingContact:
                     f"coordinates must be finite numbers of shape {needed}, one row for each node of all "
                     f"bodies, got {given}: add the displacements to scene.points"
                 )
-            places = tuple(each.placement(self.scene, coordinates, time) for each in self.meetings)
+            placements: Placements = {}
+            for each in self.meetings:
+                placements = {**placements, **each.master.placements(each.number, coordinates, time)}
         known = (last or LastPoints.none(needed[1])).points
         before = start or MaterialPoints.none(*needed)
-        moved = Moved(self.scene, coordinates, time, known, before, loose, self.reach, self.comm)
+        moved = Moved(self.scene, coordinates, placements, known, before, loose, self.reach, self.comm)
         parts = [self._found(each, moved) for each in self.meetings]
         points = join_points([part.points for part in parts], self.scene.dim, len(coordinates))
         differential = join_differentials(
             [part.differential for part in parts], self.scene.dim, len(coordinates)
         )
         lost = np.concatenate([np.zeros(0, dtype=np.int64), *[part.lost for part in parts]])
-        means = tuple(part.means for part in parts)
-        return SlidingPoints(points, coordinates, means, places, differential, lost)
+        means = {number: each for part in parts for number, each in part.means.items()}
+        return SlidingPoints(points, coordinates, means, placements, differential, lost)
 
     def found_again(
         self,
@@ -215,7 +219,7 @@ def _meeting(scene: Scene, number: int, fixed: np.ndarray, tied: np.ndarray) -> 
     slave_nodes = NodeNumbers.of(scene).global_nodes(pair.slave.body, slave.nodes)
     bearing = ~fixed[slave_nodes].all(axis=1) & ~np.isin(slave_nodes, tied)
     bearing &= may_touch(scene.bodies, pair, slave)
-    master = kind.master_of(scene, pair)
+    master = master_of(scene, pair, partial(surface_of, scene, geometry="faceted"))
     candidates = np.flatnonzero(bearing & carrying(pair, slave, master))
     count = len(candidates)
     at_nodes = np.ones(count), candidates, np.arange(count + 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -376,26 +376,26 @@ class PointAreas:
         scene: Scene,
         points: ContactPoints,
         coordinates: np.ndarray,
-        means: Sequence[MovingMeans | None],
+        means: Mapping[int, MovingMeans],
     ) -> PointAreas:
         """Measure the areas of points.
 
-        `coordinates`: of all nodes now, shape (n_nodes, dim), [length]; `means`: the coupling of each pair of
-        mortar contact; None for other pairs.
+        `coordinates`: of all nodes now, shape (n_nodes, dim), [length]; `means`: the couplings of mortar
+        contact, by their pairs.
         """
         count, before = points.count, points.area
         areas = cls(np.zeros(count), before, np.ones(count), *np.zeros((2, count), dtype=bool))
-        for index, (pair, met) in enumerate(zip(scene.contacts, means, strict=True)):
+        for index, pair in enumerate(scene.contacts):
             surface, body = slave_of(scene, pair, "faceted"), pair.slave.body
             nodes = NodeNumbers.of(scene).global_nodes(body, surface.nodes)
             slave, point = points.of_surface(index, np.arange(count))
             own = surface.point_areas_at(coordinates[nodes])[np.searchsorted(nodes, slave)]
             np.add.at(areas.now, point, own)  # a point may have the areas of several nodes
+            areas.much[points.pair == index] = scene.bodies[body].deforms_much
+        for index, met in means.items():
             mine = points.pair == index
-            areas.much[mine] = scene.bodies[body].deforms_much
-            if met is not None:
-                part = met.coupling.area / areas.now[mine]
-                areas.share[mine], areas.facing[mine] = np.maximum(part, 0.5), part > 0.5
+            part = met.coupling.area / areas.now[mine]
+            areas.share[mine], areas.facing[mine] = np.maximum(part, 0.5), part > 0.5
         return areas
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
@@ -11,6 +12,7 @@ import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.inside import ON_PLANE, InFacets, InsideOf
+from fenics_contact._pairing.masters import Placements
 from fenics_contact._pairing.points import (
     PARALLEL,
     ContactPoints,
@@ -22,7 +24,7 @@ from fenics_contact._pairing.points import (
 from fenics_contact._pairing.sliding.closest import moved_surface
 from fenics_contact._pairing.sliding.slip import LastPoints, MaterialPoints
 from fenics_contact._pairing.sliding.stiffness import Differential
-from fenics_contact._scene.obstacles import RigidObstacle, RigidPlane
+from fenics_contact._scene.obstacles import RigidPlane
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface
@@ -32,8 +34,6 @@ if TYPE_CHECKING:
     from fenics_contact._pairing.sliding.means import MovingMeans
 
 Known: TypeAlias = ContactPoints | LastPoints
-#: Rotation, shape (dim, dim), and translation, shape (dim,), [length], of an obstacle.
-Placement: TypeAlias = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Moved:
 
     scene: Scene
     coordinates: np.ndarray
-    time: float
+    placements: Placements
     last: Known
     start: MaterialPoints
     loose: frozenset[str]
@@ -60,12 +60,12 @@ class Moved:
 
 @dataclass(frozen=True)
 class Found:
-    """The points of one pair, what derivatives of them need, nodes without one, and a mortar coupling."""
+    """The points of one pair, what derivatives of them need, nodes without one, and mortar by its number."""
 
     points: ContactPoints
     differential: Differential
     lost: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    means: MovingMeans | None = None
+    means: Mapping[int, MovingMeans] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -158,28 +158,21 @@ class Candidates:
 class SlidingPair(Candidates, ABC):
     """A contact pair: its slave and, of each kind, its counterpart."""
 
+    master: Any
+
     @classmethod
     @abstractmethod
     def serves(cls, pair: ContactPair) -> bool:
         """Return whether the counterpart of a pair is of this kind, if it is of none before."""
 
     @classmethod
-    @abstractmethod
-    def master_of(cls, scene: Scene, pair: ContactPair) -> FacetedSurface | RigidObstacle:
-        """Return the surface or the obstacle that the slave faces, undeformed."""
-
-    @classmethod
-    @abstractmethod
     def of(cls, scene: Scene, pair: ContactPair, side: Candidates, master: Any) -> SlidingPair:
-        """Return the slave of a pair with its counterpart."""
+        """Return the slave of a pair with its master."""
+        return cls(**vars(side), master=master)
 
     @abstractmethod
     def at(self, moved: Moved) -> Found:
         """Return the points where the bodies lie now. Collective."""
-
-    def placement(self, scene: Scene, coordinates: np.ndarray, time: float) -> Placement | None:
-        """Return rotation and translation of an obstacle that moves, None of others."""
-        return None
 
 
 def require_inside(scene: Scene) -> None:

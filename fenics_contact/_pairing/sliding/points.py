@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -12,6 +13,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
+from fenics_contact._pairing.masters import Placements
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._pairing.search import find_contact_points, in_reach
 from fenics_contact._pairing.sliding.means import MeanTangents, MovingMeans, PointAreas, interleaved, placed
@@ -96,15 +98,15 @@ class SlidingPoints:
         points: The points; gap, normal and weights are those of the present coordinates, areas those of the
             reference configuration. The weights reach the nodes around a facet.
         coordinates: Present coordinates of all nodes, shape (n_nodes, dim), [length].
-        means: The coupling of each pair of mortar contact; None for other pairs.
-        placements: Rotation and translation of each pair's moving obstacle; None for other masters.
+        means: The couplings of mortar contact, by their pairs.
+        placements: Where obstacles are that move, by their pairs.
         lost: Slave nodes that face a facet but for which no closest point was found.
     """
 
     points: ContactPoints
     coordinates: np.ndarray
-    means: tuple[MovingMeans | None, ...]
-    placements: tuple[tuple[np.ndarray, np.ndarray] | None, ...]
+    means: Mapping[int, MovingMeans]
+    placements: Placements
     differential: Differential
     lost: np.ndarray
 
@@ -176,11 +178,17 @@ class SlidingPoints:
         left[:, :, -1] *= np.linalg.det(left @ right)[:, None]
         rotation = np.asarray(left @ right)
         rotation[np.diff(met.indptr) == 0] = np.eye(dim)
-        # A load step may leave out the last pairs, or have them again.
-        for index, (new, old) in enumerate(zip(self.placements, other.placements, strict=False)):
-            if new is not None and old is not None:
-                rotation[self.points.pair == index] = new[0] @ old[0].T
+        for index, turn in self._obstacle_turns(other).items():
+            rotation[self.points.pair == index] = turn
         return rotation
+
+    def _obstacle_turns(self, other: SlidingPoints) -> dict[int, np.ndarray]:
+        """Return the rotations of moving obstacles since another set of points, by their pairs.
+
+        A load step may leave out the last pairs, or have them again.
+        """
+        both = self.placements.keys() & other.placements.keys()
+        return {index: self.placements[index][0] @ other.placements[index][0].T for index in both}
 
     def areas(self, scene: Scene) -> PointAreas:
         """Return the areas that belong to the points, given the scene in its reference configuration."""
@@ -222,11 +230,9 @@ class SlidingPoints:
             foot, weights = foot - way, weights - self._moving_by(way)
         carried = np.diff(points.master.indptr) > 0
         foot[carried] = 0.0
-        for index, placement in enumerate(self.placements):
-            if placement is not None:
-                rotation, translation = placement
-                mine = (points.pair == index) & ~carried
-                foot[mine] = (foot[mine] - translation) @ rotation
+        for index, (rotation, translation) in self.placements.items():
+            mine = (points.pair == index) & ~carried
+            foot[mine] = (foot[mine] - translation) @ rotation
         return MaterialPoints(self.key, points.pair, weights, foot)
 
     def _moving_by(self, way: np.ndarray, flat: float = 1e-6) -> sp.csr_matrix:
@@ -352,11 +358,8 @@ class SlidingPoints:
     def slip_by_start(self, start: SlidingPoints) -> sp.csr_matrix:
         """Return the derivative of `slip` by the coordinates at its start, shaped as `slip_rows`."""
         _, here, there = np.intersect1d(self.key, start.key, assume_unique=True, return_indices=True)
-        plain: list[np.ndarray | None] = [
-            np.eye(self.coordinates.shape[1]) if now is None or then is None else now[0] @ then[0].T
-            for now, then in zip(self.placements, start.placements, strict=True)
-        ]
-        turned = [None if means else each for each, means in zip(plain, start.means, strict=True)]
+        by_nodes, known = np.setdiff1d(start.points.pair, list(start.means)), self._obstacle_turns(start)
+        turned = {int(index): known.get(index, np.eye(self.coordinates.shape[1])) for index in by_nodes}
         result = slip_by_start(
             self.points, self.coordinates, start.points, start.differential, (here, there), turned
         )
@@ -373,11 +376,9 @@ class SlidingPoints:
             start = start.extended(self.material_points())
         start = start.part(np.searchsorted(start.key, self.key))
         place = start.place.copy()
-        for index, placement in enumerate(self.placements):
-            if placement is not None:
-                rotation, translation = placement
-                mine = np.flatnonzero((start.pair == index) & (np.diff(start.weights.indptr) == 0))
-                place[mine] = place[mine] @ rotation.T + translation
+        for index, (rotation, translation) in self.placements.items():
+            mine = np.flatnonzero((start.pair == index) & (np.diff(start.weights.indptr) == 0))
+            place[mine] = place[mine] @ rotation.T + translation
         way = self._standing @ self.coordinates - place - start.weights @ self.coordinates
         return np.asarray(way), start.weights
 
@@ -393,11 +394,7 @@ class SlidingPoints:
     @property
     def _by_means(self) -> list[tuple[np.ndarray, MovingMeans]]:
         """The points of each pair of mortar contact with its coupling."""
-        return [
-            (np.flatnonzero(self.points.pair == index), means)
-            for index, means in enumerate(self.means)
-            if means is not None
-        ]
+        return [(np.flatnonzero(self.points.pair == index), means) for index, means in self.means.items()]
 
 
 def _entries_by_row(matrix: sp.csr_matrix) -> tuple[np.ndarray, sp.csr_matrix]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
@@ -119,15 +119,15 @@ def slip_by_start(
     start: ContactPoints,
     differential: Differential,
     alike: tuple[np.ndarray, np.ndarray],
-    turned: Sequence[np.ndarray | None],
+    turned: Mapping[int, np.ndarray],
 ) -> sp.csr_matrix:
     """Return the derivative of `SlidingPoints.slip` by the coordinates at its start.
 
     Of t_a·(x_s − Σ W_j(ξ₀) x_j) it is −t_a·S,_b(ξ₀) δξ₀_b, with the master where it lies now; on obstacles
     −t_a·Q δf, with the obstacle's rotation Q since the start and the foot f of the node on it.
 
-    `coordinates`: coordinates of all nodes now, shape (n_nodes, dim), [length]; `turned`: Q of each pair,
-    shape (dim, dim); None for pairs of mortar contact, which are left out.
+    `coordinates`: coordinates of all nodes now, shape (n_nodes, dim), [length]; `turned`: Q of the pairs
+    by nodes, shape (dim, dim).
 
     The result has shape (n · (dim − 1), n_dofs), dof dim · node + component, rows as those of
     `SlidingPoints.slip_rows`.
@@ -136,9 +136,7 @@ def slip_by_start(
     width, dim = points.tangents.shape[1:]
     local, slaves = point_motion(start, differential).local, start.own
     result = sp.csr_matrix((width * count, dim * nodes))
-    for index, rotation in enumerate(turned):
-        if rotation is None:
-            continue
+    for index, rotation in turned.items():
         now, then = (each[points.pair[alike[0]] == index] for each in alike)
         rigid = bool(np.any(start.facet[then] < 0))
         for a in range(width):

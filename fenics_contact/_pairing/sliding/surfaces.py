@@ -9,72 +9,45 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from fenics_contact._pairing.points import ContactPoints, NodeNumbers, with_symmetry
+from fenics_contact._pairing.masters import BodyMaster
+from fenics_contact._pairing.points import ContactPoints, with_symmetry
 from fenics_contact._pairing.sliding.closest import ClosestPoints, Roles, patch_points
 from fenics_contact._pairing.sliding.means import MovingMeans
 from fenics_contact._pairing.sliding.meeting import Candidates, Found, Moved, SlidingPair
 from fenics_contact._pairing.sliding.patches import SmoothPatches
 from fenics_contact._pairing.sliding.stiffness import Differential, without_patches
 from fenics_contact._scene.pairs import ContactPair, Surface
-from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
-from fenics_contact._surfaces.facets import FacetedSurface, shape_functions
+from fenics_contact._surfaces.facets import shape_functions
 from fenics_contact._surfaces.projection import Projection, join
 from fenics_contact.errors import together
 
 
 @dataclass(frozen=True)
 class OnSurface(SlidingPair):
-    """A slave that meets a surface of a body.
+    """A slave that meets a surface of a body."""
 
-    Attributes:
-        master_nodes: Nodes of the master among those of all bodies.
-    """
-
-    master_nodes: np.ndarray
+    master: BodyMaster
 
     @classmethod
     def serves(cls, pair: ContactPair) -> bool:
         """Surfaces of bodies."""
         return isinstance(pair.master, Surface)
 
-    @classmethod
-    def master_of(cls, scene: Scene, pair: ContactPair) -> FacetedSurface:
-        """Return the master, of its facets."""
-        assert isinstance(pair.master, Surface)
-        return surface_of(scene, pair.master, "faceted")
-
-    @classmethod
-    def numbers(cls, scene: Scene, pair: ContactPair, master: FacetedSurface) -> np.ndarray:
-        """Return the nodes of the master among those of all bodies."""
-        assert isinstance(pair.master, Surface)
-        return NodeNumbers.of(scene).global_nodes(pair.master.body, master.nodes)
-
 
 @dataclass(frozen=True)
 class OnMeans(OnSurface):
-    """A slave that meets weighted means of a master.
-
-    Attributes:
-        facets: The master in the reference configuration.
-    """
-
-    facets: FacetedSurface
+    """A slave that meets weighted means of a master."""
 
     @classmethod
     def serves(cls, pair: ContactPair) -> bool:
         """Mortar contact."""
         return pair.by_mortar
 
-    @classmethod
-    def of(cls, scene: Scene, pair: ContactPair, side: Candidates, master: Any) -> SlidingPair:
-        """Return the slave with the facets of the master."""
-        return cls(**vars(side), master_nodes=cls.numbers(scene, pair, master), facets=master)
-
     def at(self, moved: Moved) -> Found:
         """Return the points by the coupling of both surfaces. Collective."""
         coordinates, dim = moved.coordinates, moved.coordinates.shape[1]
-        surfaces = (self.slave, self.slave_nodes), (self.facets, self.master_nodes)
+        surfaces = (self.slave, self.slave_nodes), (self.master.surface, self.master.nodes)
         means = MovingMeans.of(*surfaces, self.candidates, coordinates, moved.comm)
         met = means.coupling
         chosen, near = np.searchsorted(self.candidates, met.node), met.gap <= moved.reach
@@ -83,7 +56,7 @@ class OnMeans(OnSurface):
         points = self.points(chosen, met.normal, met.gap, means.weights(len(coordinates)))
         points = with_symmetry(points, means.symmetric(), self.slave.planes)
         bent = np.zeros((points.count, dim, dim))
-        return Found(points, without_patches(bent, len(coordinates)), means=means)
+        return Found(points, without_patches(bent, len(coordinates)), means={self.number: means})
 
 
 @dataclass(frozen=True)
@@ -92,22 +65,15 @@ class OnPatches(OnSurface):
 
     Attributes:
         patches: That surface.
-        master_cut: On which planes of symmetry the nodes of the master lie, shape (n_master, n_planes).
     """
 
     patches: SmoothPatches
-    master_cut: np.ndarray
 
     @classmethod
     def of(cls, scene: Scene, pair: ContactPair, side: Candidates, master: Any) -> OnPatches:
         """Return the slave with the patches of the master."""
-        patches = SmoothPatches.of(master, smooth=pair.geometry != "faceted")
-        return OnPatches(
-            **vars(side),
-            master_nodes=cls.numbers(scene, pair, master),
-            patches=patches,
-            master_cut=master.mirrored,
-        )
+        patches = SmoothPatches.of(master.surface, smooth=pair.geometry != "faceted")
+        return OnPatches(**vars(side), master=master, patches=patches)
 
     def at(self, moved: Moved) -> Found:
         """Return the closest points. Collective."""
@@ -117,9 +83,9 @@ class OnPatches(OnSurface):
         met, mine = known[0] >= 0, start.pair == self.number
         met[np.searchsorted(self.nodes, start.key[mine] - self.number * count)] = True
         hit = self.closest(moved, known, met)
-        own, width = coordinates[self.master_nodes], len(self.master_nodes)
+        own, width = coordinates[self.master.nodes], len(self.master.nodes)
         at = patch_points(patches, patches.coefficients(own)[hit.facet], hit.local)
-        spread = sp.csr_matrix((np.ones(width), (np.arange(width), self.master_nodes)), (width, count))
+        spread = sp.csr_matrix((np.ones(width), (np.arange(width), self.master.nodes)), (width, count))
         weights, *slopes = (
             (patches.weights(hit.facet, values) @ spread).tocsr()
             for values in (at.functions.value, *np.moveaxis(at.functions.first, 2, 0))
@@ -151,7 +117,7 @@ class OnPatches(OnSurface):
         mine = np.arange(comm.rank, len(self.candidates), comm.size)
         found: Projection | None = None
         with together(comm):
-            search = self._search(coordinates[self.master_nodes], moved.reach, mine)
+            search = self._search(coordinates[self.master.nodes], moved.reach, mine)
             normals, (facet, local) = self.normals(coordinates), last
             at = coordinates[self.nodes[mine]]
             hit = search.find(at, normals[mine], facet[mine], local[mine], met[mine])
@@ -166,7 +132,7 @@ class OnPatches(OnSurface):
         """Return the symmetry planes that cut both surfaces at a point, (n, n_planes)."""
         corners = self.patches.facets[points.facet]
         shares, _ = shape_functions(points.local, corners.shape[1])
-        there = np.einsum("nk,nkd->nd", np.abs(shares), ~self.master_cut[corners]) < 0.05
+        there = np.einsum("nk,nkd->nd", np.abs(shares), ~self.master.surface.mirrored[corners]) < 0.05
         own = np.zeros((int(self.slave_nodes.max(initial=-1)) + 1, there.shape[1]), dtype=bool)
         own[self.slave_nodes] = self.slave.mirrored
         return np.asarray(there & own[points.slave])
@@ -198,8 +164,8 @@ class OnOwnBody(OnPatches):
         Candidates have no points on patches on which they lie, nor on facets behind them in the undeformed
         body: those on the other side of a thin wall.
         """
-        whole = super().of(scene, pair, side, master)
-        corners = master.points[master.facets]
+        whole, surface = super().of(scene, pair, side, master), master.surface
+        corners = surface.points[surface.facets]
         centres = corners.mean(axis=1)
         size = float(np.linalg.norm(corners - centres[:, None], axis=2).mean())
         reach = 2.0 * facets * size
@@ -214,14 +180,14 @@ class OnOwnBody(OnPatches):
         carried = whole.patches.control.tocoo()
         facet = carried.row // (whole.patches.control.shape[0] // len(centres))
         own = sp.csr_matrix(
-            (np.ones(len(facet)), (facet, whole.master_nodes[carried.col])),
-            shape=(len(centres), int(max(side.slave_nodes.max(), whole.master_nodes.max())) + 1),
+            (np.ones(len(facet)), (facet, master.nodes[carried.col])),
+            shape=(len(centres), int(max(side.slave_nodes.max(), master.nodes.max())) + 1),
         )
         touched = own[:, side.nodes]
         apart = ((behind_it + touched.T) > 0).tocsr()
-        if not np.array_equal(side.slave_nodes, whole.master_nodes):
+        if not np.array_equal(side.slave_nodes, master.nodes):
             return OnOwnBody(**vars(whole), apart=apart, reach=reach)
-        roles = Roles(whole.patches, master.points, side.candidates, touched)
+        roles = Roles(whole.patches, surface.points, side.candidates, touched)
         return OnItself(**vars(whole), apart=apart, reach=reach, roles=roles)
 
     def _search(self, points: np.ndarray, reach: float, mine: np.ndarray) -> ClosestPoints:
