@@ -19,41 +19,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from fenics_contact.feti.moved import SAME, Motion, Placement
 from fenics_contact.feti.nearby import ToleranceIndex
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """How the dofs of a subdomain lie on those of the first of its kind, u_first = P u.
-
-    `place`: dof of the subdomain on each of the first one's; `sign`: factor of each, 1 or −1; `turn`: Q,
-    which also turns the components of each node; None: the signs suffice, as the axes lie on each other.
-    """
-
-    place: np.ndarray
-    sign: np.ndarray
-    turn: np.ndarray | None = None
-
-    @classmethod
-    def of(cls, nodes: np.ndarray, Q: np.ndarray, components: int) -> Motion:
-        """Return that by an orthogonal Q, shape (dim, dim), where ``nodes`` lie on the first one's, (n,)."""
-        along, sign, turn = np.arange(components), np.ones(components), None
-        if not np.array_equal(Q, np.round(Q)):
-            turn = Q
-        elif components == len(Q):
-            along = np.abs(Q).argmax(axis=1)
-            sign = Q[np.arange(components), along]
-        return cls((components * nodes[:, None] + along).ravel(), np.tile(sign, len(nodes)), turn)
-
-    def maps(self, interface: np.ndarray, first: np.ndarray) -> bool:
-        """Return whether an interface lies on that of the first subdomain; both ascending."""
-        if self.turn is not None:  # components mix: nodes are on the interface as a whole or not at all
-            width = len(self.turn)
-            starts = first[::width, None] // width * width
-            if len(first) % width or np.any(first.reshape(-1, width) != starts + np.arange(width)):
-                return False
-        return np.array_equal(np.sort(self.place[first]), interface)
 
 
 class Kind:
@@ -162,7 +130,7 @@ class Kinds:
         self._agreement = agreement or Agreement()
         self.all: list[Kind] = []
         # By counts and trace: kind, a subdomain of it with a numbering of its own, how it lies on the first.
-        self._seen: dict[tuple[int, ...], ToleranceIndex[tuple[Kind, Kind, Motion | None]]] = defaultdict(
+        self._seen: dict[tuple[int, ...], ToleranceIndex[tuple[Kind, Kind, Placement]]] = defaultdict(
             ToleranceIndex
         )
         self._matrices: set[int] = set()
@@ -170,7 +138,7 @@ class Kinds:
     def add(self, kind: Kind) -> Kind:
         """Take a kind without comparing it with others."""
         self.all.append(kind)
-        self._seen[kind.key].add(kind.size[0], (kind, kind, None))
+        self._seen[kind.key].add(kind.size[0], (kind, kind, SAME))
         self._matrices.add(id(kind.subdomain.matrix))
         return kind
 
@@ -178,10 +146,10 @@ class Kinds:
         """Return whether those that follow may be compared with the matrix of a subdomain."""
         return id(subdomain.matrix) in self._matrices
 
-    def place(self, given: Kind) -> tuple[Kind, Motion | None]:
+    def place(self, given: Kind) -> tuple[Kind, Placement]:
         """Return the kind of a subdomain, given as one of its own, and how it lies on the first one of it.
 
-        The motion is None where it is the same dof by dof. One that is like none before is a new kind.
+        One that is like none before is a new kind.
         """
         seen, room = self._seen[given.key], self._agreement.matrix * len(given.diagonal) * given.size
         near = seen.near(given.size[0], room[0])
@@ -189,15 +157,15 @@ class Kinds:
         for kind, other, motion in near:
             if self._same_numbers(other, given):
                 return kind, motion
-        for kind, first, motion in near:
-            if motion is None:
-                found = self._motion(first, given)
+        for kind, other, _ in near:
+            if other is kind:
+                found = self._motion(kind, given)
                 if found is not None:  # others may be the same as this one dof by dof
                     seen.add(given.size[0], (kind, given, found))
                     self._matrices.add(id(given.subdomain.matrix))
                     given.forget()
                     return kind, found
-        return self.add(given), None
+        return self.add(given), SAME
 
     def forget(self) -> None:
         """Free what only comparisons need."""

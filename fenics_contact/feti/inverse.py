@@ -16,11 +16,11 @@ from scipy.linalg import blas, lapack
 from fenics_contact._base.memory import return_memory
 from fenics_contact._base.sparse import prefers_explicit
 from fenics_contact._scene.memory import Rates
-from fenics_contact.feti.alike import Kind, Kinds, Motion
+from fenics_contact.feti.alike import Kind, Kinds
 from fenics_contact.feti.compact import CompactOperator, Insides
 from fenics_contact.feti.condensation import Condensations, pieces, regular_factor
 from fenics_contact.feti.factor import Factor, regularised
-from fenics_contact.feti.moved import Batch, CongruentOperator, MovedInterface, SharedOperator
+from fenics_contact.feti.moved import SAME, Batch, Motion, Placement, SharedOperator
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_dofs
 
 
@@ -380,23 +380,23 @@ class TornInverse:
         self.factored = len(new)
         self._operate()
 
-    def _known(self, index: int, other: TornInverse) -> tuple[Kind, Motion | None] | None:
+    def _known(self, index: int, other: TornInverse) -> tuple[Kind, Placement] | None:
         """Return kind and motion of a subdomain with the same matrix and interface in another inverse."""
         same = self._subdomains[index].matrix is other._subdomains[index].matrix and self._kind is other._kind
         same = same and np.array_equal(self._local[index], other._local[index])
         return self._members[index] if same else None
 
-    def _sort(self, known: Sequence[tuple[Kind, Motion | None] | None], shared: bool) -> None:
+    def _sort(self, known: Sequence[tuple[Kind, Placement] | None], shared: bool) -> None:
         """Find the kind of each subdomain, and how it lies on the first one of its kind."""
         kinds = Kinds()
         for kind in dict.fromkeys(each[0] for each in known if each is not None):
             kinds.add(kind)  # whatever others change to, these stay
-        self._members: list[tuple[Kind, Motion | None]] = []
+        self._members: list[tuple[Kind, Placement]] = []
         uses = Counter(id(subdomain.matrix) for subdomain in self._subdomains)
         for member, subdomain, local in zip(known, self._subdomains, self._local, strict=True):
             if member is None:
                 given = Kind(subdomain, local)
-                member = kinds.place(given) if shared else (kinds.add(given), None)
+                member = kinds.place(given) if shared else (kinds.add(given), SAME)
             self._members.append(member)
             uses[id(subdomain.matrix)] -= 1
             if not (uses[id(subdomain.matrix)] or kinds.compares_with(subdomain)):
@@ -411,14 +411,11 @@ class TornInverse:
     def _operate(self) -> None:
         """Make the operators of the subdomains, and the batches of those that are applied at once."""
         self.operators: list[LocalOperator] = []
-        groups: dict[Kind, list[tuple[LocalOperator, slice, MovedInterface | None]]] = {}
+        groups: dict[Kind, list[tuple[LocalOperator, slice, Motion]]] = {}
         for (kind, motion), local, part in zip(self._members, self._local, self._parts, strict=True):
-            operator, moved = factored(kind), None
-            if motion is not None:
-                operator = CongruentOperator(operator, motion, local, kind.interface)
-                moved = operator.interface
+            operator = motion.operator(factored(kind), local, kind.interface)
             self.operators.append(operator)
-            groups.setdefault(kind, []).append((operator, part, moved))
+            groups.setdefault(kind, []).append((operator, part, motion.on(local, kind.interface)))
         self._alone: list[tuple[LocalOperator, slice]] = []
         self._batches: list[tuple[SharedOperator, Batch]] = []
         for kind, members in groups.items():
@@ -428,7 +425,7 @@ class TornInverse:
                 continue
             shared.share()
             places = [(part.start, moved) for _, part, moved in members]
-            self._batches.append((shared, Batch(places, len(kind.interface))))
+            self._batches.append((shared, Batch.of(places)))
 
     @cached_property
     def flops(self) -> tuple[int, int]:
@@ -506,12 +503,11 @@ class TornInverse:
         flexibility = np.zeros(rows.shape[0])
         columns = rows.tocsc()
         found: dict[Kind, list[tuple[np.ndarray, sp.csr_matrix]]] = {}
-        for (kind, _), operator, part in zip(self._members, self.operators, self._parts, strict=True):
+        for (kind, motion), local, part in zip(self._members, self._local, self._parts, strict=True):
             block = columns[:, part].tocsr()
             touched = np.flatnonzero(np.diff(block.indptr))
             if len(touched):
-                block = block[touched]
-                block = operator.rows_there(block) if isinstance(operator, CongruentOperator) else block
+                block = motion.rows_there(block[touched], local, kind.interface)
                 found.setdefault(kind, []).append((touched, block))
         for kind, blocks in found.items():
             touched, every = np.concatenate([each for each, _ in blocks]), sp.vstack([b for _, b in blocks])

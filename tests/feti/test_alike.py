@@ -25,7 +25,7 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.feti.alike import Kind, Kinds, Motion
+from fenics_contact.feti.alike import Kind, Kinds
 from fenics_contact.feti.compact import CompactOperator
 from fenics_contact.feti.inverse import (
     ExplicitOperator,
@@ -34,6 +34,7 @@ from fenics_contact.feti.inverse import (
     TornInverse,
     _distinct_rows,
 )
+from fenics_contact.feti.moved import SAME, Placement
 from fenics_contact.feti.subdomain import Assembled, assemble
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -134,7 +135,7 @@ def test_matrices_are_held_no_longer_than_others_are_compared_with_them(
 ) -> None:
     placed, held, place = list[Kind](), list[int](), Kinds.place
 
-    def recorded(self: Kinds, given: Kind) -> tuple[Kind, Motion | None]:
+    def recorded(self: Kinds, given: Kind) -> tuple[Kind, Placement]:
         held.append(sum(each.subdomain.matrix.held for each in placed))
         placed.append(given)
         return place(self, given)
@@ -285,8 +286,8 @@ def test_interfaces_elsewhere_are_other_kinds_unless_the_shape_maps_them() -> No
 
 
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    def apart(kinds: Kinds, given: Kind) -> tuple[Kind, None]:
-        return kinds.add(given), None
+    def apart(kinds: Kinds, given: Kind) -> tuple[Kind, Placement]:
+        return kinds.add(given), SAME
 
     monkeypatch.setattr(Kinds, "place", apart)
 
@@ -417,9 +418,9 @@ def test_stiffnesses_that_agree_in_diagonal_trace_and_norm_alone_are_not_alike()
     np.testing.assert_allclose(given.size, first.size)
     np.testing.assert_allclose(given.marks, first.marks)
     kinds = Kinds()
-    assert kinds.place(first) == (first, None)
-    assert kinds.place(given) == (given, None)
-    assert kinds.place(again) == (first, None)
+    assert kinds.place(first) == (first, SAME)
+    assert kinds.place(given) == (given, SAME)
+    assert kinds.place(again) == (first, SAME)
 
 
 @dataclass(eq=False)

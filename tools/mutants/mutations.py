@@ -323,8 +323,8 @@ MUTATIONS = (
     Mutation(
         "what a mirrored subdomain returns keeps the signs of the first one",
         "feti/moved.py",
-        "vector[motion.place] = motion.sign * moved",
-        "vector[motion.place] = moved",
+        "vector[self.place] = self.sign * moved",
+        "vector[self.place] = moved",
         ("tests/feti/test_alike.py::test_mirrored_pieces_are_one_kind",),
     ),
     Mutation(
