@@ -214,7 +214,7 @@ def _resisted_by_material(body: Body, modes: np.ndarray) -> np.ndarray:
     """Return an orthonormal basis of the rigid motions that cost energy, shape (n_modes, n)."""
     count = modes.shape[2]
     flat = modes.reshape(-1, count)
-    kernel = kernel_of_body(body, body.mesh.points).reshape(len(flat), -1)
+    kernel = kernel_of_body(body, body.mesh.points, body.materials).reshape(len(flat), -1)
     if kernel.shape[1] == count:
         return np.zeros((count, 0))
     free, _ = np.linalg.qr(np.linalg.lstsq(flat, kernel, rcond=None)[0])

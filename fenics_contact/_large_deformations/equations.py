@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from fenics_contact._base.display import displayed
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._fem.composition import composition
-from fenics_contact._fem.mechanics import FROM_REST, MaterialStep, Mechanics, Response
+from fenics_contact._fem.mechanics import MaterialStep, Mechanics, Response
 from fenics_contact._large_deformations.loading import DeadLoads, Loading, RigidStart
 from fenics_contact._large_deformations.moving_contact import (
     NO_ROWS,
@@ -301,8 +301,7 @@ class Equations:
         points = mesh.by_input_node(body.mesh.points[mesh.nodes])
         parts = composition(body, mesh.cells)
         forms = self.decomposition.forms
-        mechanics = forms.mechanics(parts, body.element, mesh.space, points)
-        return mechanics if mesh.expanded is None else _OfSeveralShapes(mesh, mechanics)
+        return mesh.answering(forms.mechanics(parts, body.element, mesh.space, points))
 
     def _with_free(self, torn: TornSystem, unbalanced: Vector, multiplier: Vector) -> Vector:
         """Return forces out of balance, on the first rank with those at free motions. Collective."""
@@ -401,24 +400,6 @@ class Equations:
             self.stiffness,
         )  # fmt: skip
         return ResidualState(self, load, at, responses, external, growth, unbalanced, open_, residuals, least)
-
-
-@dataclass(frozen=True, eq=False)
-class _OfSeveralShapes:
-    """`Mechanics` of a mesh of several shapes of cells by that of its hexahedra."""
-
-    mesh: SubdomainMesh
-    mechanics: Mechanics
-
-    def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
-        mesh = self.mesh
-        origin = None if step.origin is None else mesh.on_space(step.origin)
-        response = self.mechanics.at(mesh.on_space(displacement), replace(step, origin=origin))
-        force = mesh.force_of(response.force)
-        return replace(response, force=force).with_matrices(mesh.matrix_of)
-
-    def least_jacobian(self, displacement: np.ndarray) -> float:
-        return self.mechanics.least_jacobian(self.mesh.on_space(displacement))
 
 
 def _following(response: Response, mesh: SubdomainMesh) -> Response:

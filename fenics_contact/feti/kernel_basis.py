@@ -103,7 +103,9 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     comm = torn.numbering.comm
     with together(comm):
         bodies = {name: torn.scene.bodies[name] for name in {part.mesh.body for part in torn.subdomains}}
-        modes = {name: kernel_of_body(body, body.mesh.points) for name, body in bodies.items()}
+        modes = {
+            name: kernel_of_body(body, body.mesh.points, body.materials) for name, body in bodies.items()
+        }
         mine = {part.mesh.number: _coefficients(part, modes[part.mesh.body]) for part in torn.subdomains}
     parts = {number: coefficients for share in comm.allgather(mine) for number, coefficients in share.items()}
     total, first = int(offset[-1]), torn.decomposition.tearing.subdomain_offset

@@ -16,6 +16,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._fem.composition import Composition, composition
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.load_forms import has_work, loaded_cells, region_of
+from fenics_contact._fem.mechanics import FROM_REST, MaterialStep, Mechanics, Response
 from fenics_contact._fem.model_checks import check_kernel, kernel_of
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
@@ -92,26 +93,6 @@ def interface_dofs(
     return np.flatnonzero(touched)
 
 
-@dataclass(frozen=True, eq=False)
-class Expanded:
-    """How cells of several shapes are hexahedra: what values at nodes are at the nodes of these.
-
-    `nodes`: values by input node of the dolfinx mesh by those by block, shape (n_input, n_blocks); `dofs`:
-    values of dolfinx's dofs by those of the subdomain's, shape (n, components · n_blocks).
-    """
-
-    nodes: sp.csr_matrix
-    dofs: sp.csr_matrix
-
-    def values(self, by_block: np.ndarray) -> np.ndarray:
-        """Return values by input node."""
-        return np.asarray(self.nodes @ by_block)
-
-    def on(self, blocks: np.ndarray) -> np.ndarray:
-        """Return which input nodes depend on marked blocks alone."""
-        return np.asarray(abs(self.nodes) @ (~blocks).astype(float) == 0.0)
-
-
 @displayed
 @dataclass(frozen=True)
 class SubdomainMesh:
@@ -120,8 +101,7 @@ class SubdomainMesh:
     Blocks of dofs, one dof per component, are numbered as dolfinx numbers them. `nodes`: nodes of the body,
     by block: block b sits on node ``nodes[b]``; `space`: dolfinx function space of displacements on a mesh of
     its own, or one that subdomains with cells connected alike share: nodes are where who assembled last has
-    moved them; `facets`: surface of the body -> (cells, local facets) on this mesh; `facets_of` adds to it;
-    `expanded`: how cells of several shapes are hexahedra; None where they are of one shape.
+    moved them; `facets`: surface of the body -> (cells, local facets) on this mesh; `facets_of` adds to it.
     """
 
     number: int
@@ -131,34 +111,30 @@ class SubdomainMesh:
     space: _dolfinx.fem.FunctionSpace
     facets: dict[str, tuple[np.ndarray, np.ndarray]]
     following: AnyFollowing
-    expanded: Expanded | None = None
 
     def by_input_node(self, values: np.ndarray) -> np.ndarray:
         """Return values by input node of the dolfinx mesh of those by block, (n_blocks, ...)."""
-        if self.expanded is not None:
-            return self.expanded.values(values)
         return values[np.argsort(self.nodes)]
 
     def acted(self, nodes: np.ndarray) -> np.ndarray:
         """Return which input nodes of the dolfinx mesh lie on some nodes of the body, bool, (n,)."""
-        here = np.isin(self.nodes, nodes)
-        if self.expanded is not None:
-            return self.expanded.on(here)
-        return here[np.argsort(self.nodes)]
+        return np.isin(self.nodes, nodes)[np.argsort(self.nodes)]
 
     def on_space(self, values: np.ndarray) -> np.ndarray:
         """Return values of dolfinx's dofs by those of the dofs, (size,)."""
-        return values if self.expanded is None else np.asarray(self.expanded.dofs @ values)
+        return values
 
     def force_of(self, assembled: np.ndarray) -> np.ndarray:
         """Return a vector of the dofs by one that dolfinx has assembled."""
-        return assembled if self.expanded is None else np.asarray(self.expanded.dofs.T @ assembled)
+        return assembled
 
     def matrix_of(self, assembled: sp.csr_matrix) -> sp.csr_matrix:
         """Return a matrix of the dofs by one that dolfinx has assembled."""
-        if self.expanded is None:
-            return assembled
-        return (self.expanded.dofs.T @ assembled @ self.expanded.dofs).tocsr()
+        return assembled
+
+    def answering(self, mechanics: Mechanics) -> Mechanics:
+        """Return the mechanics of the dofs by those of dolfinx's."""
+        return mechanics
 
     @property
     def components(self) -> int:
@@ -172,19 +148,75 @@ class SubdomainMesh:
 
     def facets_of(self, body: Body, surface: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the part of a surface of the body that lies on this mesh: cells, local facets."""
-        if surface not in self.facets and self.expanded is not None:
-            facets = corners_of(body.mesh.surfaces[surface], body.mesh.dim)
-            columns = _dolfinx.facet_corners(body.mesh.cell_type)
-            faces = body.mesh.cells[self.cells][:, columns].reshape(-1, columns.shape[1])
-            here = np.flatnonzero(match_faces(faces, facets) >= 0)
-            self.facets[surface] = here // len(columns), here % len(columns)
-        elif surface not in self.facets:
-            used = np.sort(self.nodes)
-            facets = corners_of(body.mesh.surfaces[surface], body.mesh.dim)
-            inside = np.isin(facets, used).all(axis=1)
-            own = np.searchsorted(used, facets[inside])
-            self.facets[surface] = _dolfinx.match_facets(self.space.mesh, own)
+        if surface not in self.facets:
+            self.facets[surface] = self._matched(body, corners_of(body.mesh.surfaces[surface], body.mesh.dim))
         return self.facets[surface]
+
+    def _matched(self, body: Body, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        used = np.sort(self.nodes)
+        inside = np.isin(facets, used).all(axis=1)
+        return _dolfinx.match_facets(self.space.mesh, np.searchsorted(used, facets[inside]))
+
+
+@displayed
+@dataclass(frozen=True)
+class MixedMesh(SubdomainMesh):
+    """A subdomain whose cells of several shapes are hexahedra: values at its nodes are at the nodes of these.
+
+    `on_input`: values by input node of the dolfinx mesh by those by block, shape (n_input, n_blocks);
+    `on_dofs`: values of dolfinx's dofs by those of the subdomain's, shape (n, components · n_blocks).
+    """
+
+    on_input: sp.csr_matrix
+    on_dofs: sp.csr_matrix
+
+    def by_input_node(self, values: np.ndarray) -> np.ndarray:
+        """Return values by input node of the dolfinx mesh of those by block."""
+        return np.asarray(self.on_input @ values)
+
+    def acted(self, nodes: np.ndarray) -> np.ndarray:
+        """Return which input nodes of the dolfinx mesh depend on some nodes of the body alone."""
+        return np.asarray(abs(self.on_input) @ (~np.isin(self.nodes, nodes)).astype(float) == 0.0)
+
+    def on_space(self, values: np.ndarray) -> np.ndarray:
+        """Return values of dolfinx's dofs by those of the dofs."""
+        return np.asarray(self.on_dofs @ values)
+
+    def force_of(self, assembled: np.ndarray) -> np.ndarray:
+        """Return a vector of the dofs by one that dolfinx has assembled."""
+        return np.asarray(self.on_dofs.T @ assembled)
+
+    def matrix_of(self, assembled: sp.csr_matrix) -> sp.csr_matrix:
+        """Return a matrix of the dofs by one that dolfinx has assembled."""
+        return (self.on_dofs.T @ assembled @ self.on_dofs).tocsr()
+
+    def answering(self, mechanics: Mechanics) -> Mechanics:
+        """Return the mechanics of the dofs by those of dolfinx's."""
+        return _OfHexahedra(self, mechanics)
+
+    def _matched(self, body: Body, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        columns = _dolfinx.facet_corners(body.mesh.cell_type)
+        faces = body.mesh.cells[self.cells][:, columns].reshape(-1, columns.shape[1])
+        here = np.flatnonzero(match_faces(faces, facets) >= 0)
+        return here // len(columns), here % len(columns)
+
+
+@dataclass(frozen=True, eq=False)
+class _OfHexahedra:
+    """`Mechanics` of a mesh of several shapes of cells by that of its hexahedra."""
+
+    mesh: MixedMesh
+    mechanics: Mechanics
+
+    def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
+        mesh = self.mesh
+        origin = None if step.origin is None else mesh.on_space(step.origin)
+        response = self.mechanics.at(mesh.on_space(displacement), replace(step, origin=origin))
+        force = mesh.force_of(response.force)
+        return replace(response, force=force).with_matrices(mesh.matrix_of)
+
+    def least_jacobian(self, displacement: np.ndarray) -> float:
+        return self.mechanics.least_jacobian(self.mesh.on_space(displacement))
 
 
 @displayed
@@ -237,7 +269,21 @@ class CachedMatrix:
         self._matrix = None
 
 
-class Assembled:
+class Alone:
+    """Subdomains whose matrices serve no others."""
+
+    def add(self, subdomain: Subdomain) -> None:
+        """Add none."""
+
+    def same_as(self, mesh: SubdomainMesh, parts: Composition, points: np.ndarray) -> Subdomain | None:
+        """Return none."""
+        return None
+
+
+ALONE = Alone()
+
+
+class Assembled(Alone):
     """Subdomains assembled so far; their matrices serve others that are the same but for a translation."""
 
     def __init__(self) -> None:
@@ -270,14 +316,14 @@ def cut_out(
     body_name: str,
     body: Body,
     cells: np.ndarray,
-    spaces: dict[bytes, _dolfinx.fem.FunctionSpace] | None = None,
+    spaces: dict[bytes, _dolfinx.fem.FunctionSpace],
 ) -> SubdomainMesh:
     """Build the mesh of one subdomain.
 
     `spaces`: those built so far, to which its own is added. Subdomains whose cells are connected alike share
     one: whoever assembles on it moves its nodes first.
     """
-    mesh, spaces = body.mesh, {} if spaces is None else spaces
+    mesh = body.mesh
     used, local = np.unique(mesh.cells[cells], return_inverse=True)
     local = local.reshape(len(cells), -1).astype(np.int32)
     key = blake2b(f"{body.element.name} {body.components}".encode() + local.tobytes()).digest()
@@ -296,9 +342,7 @@ def cut_out(
         by_dof[dofs] = input_nodes
         on_dofs = sp.kron(several[1][by_dof], sp.identity(body.components), format="csr")
         following = Following.of(mesh, used, body.components)
-        return SubdomainMesh(
-            number, body_name, cells, used, space, {}, following, Expanded(several[1], on_dofs)
-        )
+        return MixedMesh(number, body_name, cells, used, space, {}, following, several[1], on_dofs)
     nodes = np.empty(len(used), dtype=np.int64)
     nodes[dofs] = used[input_nodes]
     return SubdomainMesh(
@@ -314,7 +358,7 @@ def assemble(
     earlier: Subdomain | None = None,
     foundations: Sequence[ElasticFoundation] = (),
     *,
-    assembled: Assembled | None = None,
+    assembled: Alone = ALONE,
 ) -> Subdomain:
     """Assemble K_s, f_s and R_s for the present coordinates of ``body``.
 
@@ -325,11 +369,13 @@ def assemble(
     points = body.mesh.points[mesh.nodes]
     acting = tuple(load for load in loads if _acts(load, mesh, body))
     springs = body.springs if isinstance(body, ToolBody) else ()
-    known = earlier is not None and earlier.foundations == beds and earlier.springs == springs
-    if earlier is None or not known or not _same_stiffness(earlier, parts, points):
-        earlier = _with_stiffness(mesh, body, parts, forms, points, beds, assembled)
-    elif assembled is not None and _depends_on_shape_alone(mesh, body, parts, forms, beds):
+    if not _depends_on_shape_alone(body, parts, forms, beds):
+        assembled = ALONE
+    now = parts, points, beds, springs
+    if earlier is not None and _same_stiffness(earlier, *now):
         assembled.add(earlier)
+    else:
+        earlier = _with_stiffness(mesh, body, forms, *now, assembled)
     if earlier.loads == acting:
         return earlier
     force = np.zeros(mesh.size)
@@ -401,23 +447,29 @@ def _acts(load: Load, mesh: SubdomainMesh, body: Body) -> bool:
     return not isinstance(load, SurfaceLoad) or len(mesh.facets_of(body, load.surface)[0]) > 0
 
 
-def _same_stiffness(earlier: Subdomain, parts: Composition, points: np.ndarray) -> bool:
-    return earlier.material.same_as(parts) and np.array_equal(earlier.points, points)
+def _same_stiffness(
+    earlier: Subdomain,
+    parts: Composition,
+    points: np.ndarray,
+    beds: tuple[ElasticFoundation, ...],
+    springs: tuple[float, ...],
+) -> bool:
+    same = earlier.foundations == beds and earlier.springs == springs
+    return same and earlier.material.same_as(parts) and np.array_equal(earlier.points, points)
 
 
 def _with_stiffness(
     mesh: SubdomainMesh,
     body: Body,
-    parts: Composition,
     forms: FormLibrary,
+    parts: Composition,
     points: np.ndarray,
     foundations: tuple[ElasticFoundation, ...],
-    assembled: Assembled | None,
+    springs: tuple[float, ...],
+    assembled: Alone,
 ) -> Subdomain:
     """Return the subdomain without loads."""
-    if not _depends_on_shape_alone(mesh, body, parts, forms, foundations):
-        assembled = None
-    twin = None if assembled is None else assembled.same_as(mesh, parts, points)
+    twin = assembled.same_as(mesh, parts, points)
     if twin is not None:
         kernel = kernel_of_body(body, points, parts.materials).reshape(mesh.size, -1)
         return replace(twin, mesh=mesh, loads=(), points=points, load=np.zeros(mesh.size), kernel=kernel)
@@ -444,20 +496,14 @@ def _with_stiffness(
         kernel = kernel @ separated(bed, kernel)[1]
     check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
     typical = float(K.diagonal().mean())
-    springs = body.springs if isinstance(body, ToolBody) else ()
     nothing = np.zeros(mesh.size)
     found = Subdomain(mesh, parts, foundations, (), points, nothing, kernel, typical, matrix, springs)
-    if assembled is not None:
-        assembled.add(found)
+    assembled.add(found)
     return found
 
 
 def _depends_on_shape_alone(
-    mesh: SubdomainMesh,
-    body: Body,
-    parts: Composition,
-    forms: FormLibrary,
-    beds: Sequence[ElasticFoundation],
+    body: Body, parts: Composition, forms: FormLibrary, beds: Sequence[ElasticFoundation]
 ) -> bool:
     """Return whether the stiffness depends on cells, numbering, materials and shape, but not on the place."""
     special = bool(beds) or isinstance(body, ToolBody)
@@ -483,11 +529,11 @@ def _from_own_origin(points: np.ndarray) -> np.ndarray:
     return np.asarray(points - points[0])
 
 
-def kernel_of_body(body: Body, points: np.ndarray, materials: Sequence[Material] | None = None) -> np.ndarray:
+def kernel_of_body(body: Body, points: np.ndarray, materials: Sequence[Material]) -> np.ndarray:
     """Return the modes without energy of a body at points, (n, dim, n_modes)."""
     if isinstance(body, ToolBody):
         return body.kernel(points)
-    return common_kernel(body.materials if materials is None else materials, points, body.kinematics)
+    return common_kernel(materials, points, body.kinematics)
 
 
 def common_kernel(materials: Sequence[Material], points: np.ndarray, kinematics: Kinematics) -> np.ndarray:

@@ -133,7 +133,7 @@ def test_subdomains_whose_cells_are_connected_alike_share_a_mesh() -> None:
     assert np.abs(stiffnesses[0] - stiffnesses[-1]).max() > 1e-3 * np.abs(stiffnesses[0]).max()
     for part, stiffness in zip(torn.subdomains, stiffnesses, strict=True):
         alone = assemble(
-            cut_out(part.mesh.number, "block", scene.bodies["block"], np.sort(part.mesh.cells)),
+            cut_out(part.mesh.number, "block", scene.bodies["block"], np.sort(part.mesh.cells), {}),
             scene.bodies["block"], scene.loads, torn.decomposition.forms,
         )  # fmt: skip
         assert alone.mesh.space is not part.mesh.space

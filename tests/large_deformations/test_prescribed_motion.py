@@ -371,7 +371,7 @@ def test_stiffness_is_the_derivative_of_the_force_and_turns_with_the_body(cell: 
     scene, forms = Scene({"body": body}, loads=[load]), FormLibrary(MPI.COMM_SELF)
     forms.prepare(scene)
     forms.prepare_mechanics(scene)
-    mesh = cut_out(0, "body", body, np.arange(body.mesh.n_cells))
+    mesh = cut_out(0, "body", body, np.arange(body.mesh.n_cells), {})
     order = np.argsort(mesh.nodes)
     acted = np.isin(mesh.nodes[order], body.mesh.surfaces["x1"])
     points = body.mesh.points[mesh.nodes]

@@ -45,7 +45,7 @@ def patch_of(body: Body, forms: FormLibrary | None = None) -> Patch:
     scene = Scene({"body": body})
     forms.prepare(scene)
     forms.prepare_mechanics(scene)
-    mesh = cut_out(0, "body", body, np.arange(body.mesh.n_cells))
+    mesh = cut_out(0, "body", body, np.arange(body.mesh.n_cells), {})
     points = body.mesh.points[mesh.nodes]
     parts = composition(body, mesh.cells)
     by_input_node = points[np.argsort(mesh.nodes)]

@@ -89,7 +89,7 @@ def whole(body: Body, loads: tuple[Load, ...] = (), forms: FormLibrary | None = 
     scene = Scene({"cell": body}, loads=loads)
     forms = FormLibrary(MPI.COMM_SELF) if forms is None else forms
     forms.prepare(scene)
-    mesh = cut_out(0, "cell", body, np.arange(body.mesh.n_cells))
+    mesh = cut_out(0, "cell", body, np.arange(body.mesh.n_cells), {})
     return assemble(mesh, body, as_tractions(scene), forms)
 
 

@@ -172,7 +172,7 @@ def test_bodies_of_several_materials_add_them_up(other: IsotropicElasticity | Ne
 
 
 def parts_of(body: Body, halves: np.ndarray, forms: FormLibrary) -> list[tuple[SubdomainMesh, Mechanics]]:
-    meshes = [cut_out(k, "body", body, np.flatnonzero(halves == k)) for k in range(2)]
+    meshes = [cut_out(k, "body", body, np.flatnonzero(halves == k), {}) for k in range(2)]
     return [
         (
             mesh,
