@@ -17,6 +17,7 @@ from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.dual import DirichletPreconditioner, DualSystem
 from fenics_contact.feti.factor import (
     Factor,
+    NoFactor,
     fixing_dofs,
     held_by,
     motions_at,
@@ -185,7 +186,7 @@ class TangentOperator(FactoredOperator):
         rest = dofs_inside(K, interface)
         self._at_interface, self._at_rest = columns[interface], columns[rest]
         inner = mostly_positive(K[rest][:, rest].tocsr(), inner) if len(rest) else None
-        inside = None if inner is None else _Updated(inner, self._at_rest, self._relief)
+        inside = NoFactor() if inner is None else _Updated(inner, self._at_rest, self._relief)
         self._factors = factor, inner
         super().__init__(K, interface, whole, inside)
 

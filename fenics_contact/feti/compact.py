@@ -27,14 +27,14 @@ class Inside:
         self.dofs = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
         rows = stiffness[self.dofs]
         self._K_ib, self._K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
-        self._factor = Factor.of_stiffness(rows[:, self.dofs].tocsr()) if len(self.dofs) else None
+        self._factor = Factor.of_stiffness(rows[:, self.dofs].tocsr())
         if not held:
             subdomain.matrix.forget()
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Return K_ii⁻¹ times a vector on the inside."""
         solution = np.zeros_like(right)
-        if self._factor is not None and right.any():
+        if right.any():
             self._factor.solve(right, solution)
         return solution
 

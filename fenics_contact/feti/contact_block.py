@@ -14,7 +14,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact.errors import together
 from fenics_contact.feti.decomposition import DualNumbering
-from fenics_contact.feti.factor import Factor
+from fenics_contact.feti.factor import Factor, NoFactor
 
 #: Fraction of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
 #: than displacements, which makes the block singular; elsewhere so small a fraction has no effect.
@@ -87,36 +87,26 @@ class ContactBlock:
     Only ranks that own such rows exchange numbers with it, one for each row.
     """
 
-    def __init__(
-        self,
-        holder: _Holder,
-        gram: sp.csr_matrix,
-        basis: sp.csr_matrix | None = None,
-        soft: np.ndarray | None = None,
-    ) -> None:
-        """Take the matrix, or its part on the columns of a basis, shape (n_rows, n_face).
+    def __init__(self, holder: _Holder, gram: sp.csr_matrix, soft: np.ndarray) -> None:
+        """Take the matrix, and marks of rows that give way; empty on other ranks than the holder."""
+        self._holder, self._gram, self._soft = holder, gram, soft
+        self._matrix = self._on_columns()
+        self._size = self._matrix.shape[0]
 
-        Both are empty on other ranks than the holder. `soft`: marks of rows that give way; None: none do.
-        """
-        self._holder, self._gram, self._basis, self._soft = holder, gram, basis, soft
-        matrix = gram if basis is None else (basis.T @ gram @ basis).tocsr()
-        self._size, self._matrix = matrix.shape[0], matrix
-        self._transposed = None if basis is None else basis.T.tocsr()
+    def _on_columns(self) -> sp.csr_matrix:
+        """Return the matrix of the columns."""
+        return self._gram
 
     @cached_property
-    def _factor(self) -> Factor | None:
-        """Factors, on first use; None on other ranks, and without any columns. Collective then."""
+    def _factor(self) -> Factor | NoFactor:
+        """Factors, on first use; none on other ranks, and without any columns. Collective then."""
         with together(self._holder.comm):
-            return _regularised(self._matrix, self._sizes) if self._size else None
+            return _regularised(self._matrix, self._sizes) if self._size else NoFactor()
 
     @cached_property
     def _sizes(self) -> np.ndarray:
-        """Diagonal of the block; on the offset of a slipping disc that of the disc, of which it may be 0."""
-        diagonal = self._gram.diagonal()
-        if self._basis is None:
-            return diagonal
-        columns = self._basis.tocsc()
-        return np.maximum.reduceat(diagonal[columns.indices], columns.indptr[:-1])
+        """Diagonal of the block."""
+        return np.asarray(self._gram.diagonal())
 
     @classmethod
     def of_rows(
@@ -129,10 +119,11 @@ class ContactBlock:
         holder = _Holder.of(numbering, n_gluing)
         parts = holder.joined(share.data, place[share.row], place[share.col])
         if not parts:
-            return cls(holder, sp.csr_matrix((0, 0)))
+            return cls(holder, sp.csr_matrix((0, 0)), np.zeros(0, dtype=bool))
         value, row, column = (np.concatenate(part) for part in zip(*parts, strict=True))
         count = numbering.total - n_gluing
-        return cls(holder, sp.csr_matrix((value, (row, column)), shape=(count, count)))
+        gram = sp.csr_matrix((value, (row, column)), shape=(count, count))
+        return cls(holder, gram, np.zeros(count, dtype=bool))
 
     def on_face(self, restriction: sp.csr_matrix) -> ContactBlock:
         """Return the block of the rows of a face. Collective."""
@@ -145,12 +136,12 @@ class ContactBlock:
             row, value = (np.concatenate([part[k] for part in parts]) for k in (0, 2))
             where = np.concatenate([part[1] + start for part, start in zip(parts, starts, strict=False)])
             basis = sp.csr_matrix((value, (row, where)), shape=(self._gram.shape[0], int(starts[-1])))
-        return ContactBlock(self._holder, self._gram, basis, self._soft)
+        return _BlockOfFace(self._holder, self._gram, self._soft, basis)
 
     def softened(self, soft: np.ndarray) -> ContactBlock:
         """Return the block with marks of rows that give way, owned, and contradict no other. Collective."""
         marks = self._holder.gathered(soft.astype(np.float64)) > 0.0
-        return ContactBlock(self._holder, self._gram, None, marks)
+        return ContactBlock(self._holder, self._gram, marks)
 
     def solve(self, x: np.ndarray) -> np.ndarray:
         """Return the solution on these rows, zero on those that are not on the face. Collective."""
@@ -158,9 +149,8 @@ class ContactBlock:
             return x
         factor, right = self._factor, self._gathered(x)
         solution = np.empty(self._size)
-        if factor is not None:
-            count_flops(self._holder.comm, 4 * factor.entries)
-            factor.solve(right, solution)
+        count_flops(self._holder.comm, 4 * factor.entries)
+        factor.solve(right, solution)
         result = x.copy()
         result[self._holder.owned] = self._scattered(solution)
         return result
@@ -171,7 +161,7 @@ class ContactBlock:
             return None
         factor, right, comm = self._factor, self._gathered(x), self._holder.comm
         with together(comm):
-            part = None if factor is None else self._dependent(factor, right)
+            part = self._dependent(factor, right) if self._size else None
         count = 0 if part is None else int(part[2].max()) + 1
         count = comm.bcast(count, root=self._holder.rank)
         if count == 0:
@@ -184,35 +174,61 @@ class ContactBlock:
         return parts[0], parts[1], parts[2], count
 
     def _dependent(
-        self, factor: Factor, right: np.ndarray
+        self, factor: Factor | NoFactor, right: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Return `_dependent_part` of all columns, with numbers from one, 0 where nothing is left."""
         part = _dependent_part(self._matrix, factor, right, self._sizes)
-        # Beside their rows, slipping discs feel the stiffness of their circle, and depend on nothing.
-        alone = np.ones(self._size, dtype=bool)
-        if part is not None and self._basis is not None:
-            alone = np.diff(self._basis.tocsc().indptr) == 1
-        if part is not None and self._soft is not None:
-            soft = self._soft if self._transposed is None else self._transposed @ self._soft != 0.0
-            alone &= ~soft
-        if part is not None and not alone.all():
-            matrix, sizes = self._matrix[alone][:, alone].tocsr(), self._sizes[alone]
-            again = _regularised(matrix, sizes) if alone.any() else None
-            part = None if again is None else _dependent_part(matrix, again, right[alone], sizes)
-        if part is None:
+        if part is None or not (alone := self._may_depend).any():
             return None
+        if not alone.all():
+            matrix, sizes = self._matrix[alone][:, alone].tocsr(), self._sizes[alone]
+            part = _dependent_part(matrix, _regularised(matrix, sizes), right[alone], sizes)
+            if part is None:
+                return None
         excess, force, number = (np.zeros(self._size) for _ in range(3))
         excess[alone], force[alone], number[alone] = part[0], part[1], part[2] + 1.0
         return excess, force, number
 
+    @property
+    def _may_depend(self) -> np.ndarray:
+        """Marks of columns that may depend on others."""
+        return ~self._soft
+
     def _gathered(self, x: np.ndarray) -> np.ndarray:
-        """Return an owned vector on all columns of the face, on the holder. Collective."""
-        right = self._holder.gathered(x)
-        return right if self._transposed is None else np.asarray(self._transposed @ right)
+        """Return an owned vector on all columns, on the holder. Collective."""
+        return self._holder.gathered(x)
 
     def _scattered(self, columns: np.ndarray) -> np.ndarray:
-        """Return this rank's rows of a vector on the columns of the face. Collective."""
-        return self._holder.scattered(columns if self._basis is None else np.asarray(self._basis @ columns))
+        """Return this rank's rows of a vector on the columns. Collective."""
+        return self._holder.scattered(columns)
+
+
+class _BlockOfFace(ContactBlock):
+    """The part on the columns of a basis, shape (n_rows, n_face), empty on other ranks than the holder."""
+
+    def __init__(self, holder: _Holder, gram: sp.csr_matrix, soft: np.ndarray, basis: sp.csr_matrix) -> None:
+        self._basis, self._transposed = basis, basis.T.tocsr()
+        super().__init__(holder, gram, soft)
+
+    def _on_columns(self) -> sp.csr_matrix:
+        return (self._basis.T @ self._gram @ self._basis).tocsr()
+
+    @cached_property
+    def _sizes(self) -> np.ndarray:
+        # On the offset of a slipping disc that of the disc, of which the diagonal may be 0.
+        diagonal, columns = self._gram.diagonal(), self._basis.tocsc()
+        return np.maximum.reduceat(diagonal[columns.indices], columns.indptr[:-1])
+
+    @property
+    def _may_depend(self) -> np.ndarray:
+        # Beside their rows, slipping discs feel the stiffness of their circle, and depend on nothing.
+        return (np.diff(self._basis.tocsc().indptr) == 1) & (self._transposed @ self._soft == 0.0)
+
+    def _gathered(self, x: np.ndarray) -> np.ndarray:
+        return np.asarray(self._transposed @ self._holder.gathered(x))
+
+    def _scattered(self, columns: np.ndarray) -> np.ndarray:
+        return self._holder.scattered(np.asarray(self._basis @ columns))
 
 
 def _regularised(matrix: sp.csr_matrix, sizes: np.ndarray) -> Factor:
@@ -225,7 +241,7 @@ def _regularised(matrix: sp.csr_matrix, sizes: np.ndarray) -> Factor:
 
 
 def _dependent_part(
-    matrix: sp.csr_matrix, regularised: Factor, right: np.ndarray, diagonal: np.ndarray
+    matrix: sp.csr_matrix, regularised: Factor | NoFactor, right: np.ndarray, diagonal: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Return z = D N (Nᵀ D N)⁻¹ Nᵀ x with A N = 0, D⁻¹ z, and coupled rows; None for zero.
 

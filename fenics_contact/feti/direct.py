@@ -13,7 +13,7 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.errors.kinds import safe_log
-from fenics_contact.feti.factor import Factor
+from fenics_contact.feti.factor import Factor, NoFactor
 from fenics_contact.feti.torn import TornSystem
 
 _LOG = logging.getLogger(__name__)
@@ -49,7 +49,7 @@ class DirectSystem:
     """
 
     products = 0
-    _factor: Factor | None  # None where supports prescribe everything
+    _factor: Factor | NoFactor
 
     def __init__(
         self, torn: TornSystem, timer: PhaseTimer | None = None, *, previous: DirectSystem | None = None
@@ -57,32 +57,34 @@ class DirectSystem:
         """Factor the stiffness."""
         self.torn = torn
         (body,) = torn.subdomains
-        self._turn = _turned(torn)
+        self._axes = _axes_of(torn)
         # Each row of a support holds one component, along the axes of its node.
-        self._fixed = (torn.B if self._turn is None else _rounded(torn.B @ self._turn.T)).indices
+        self._fixed = self._axes.rows(torn.B).indices
         self._free = np.setdiff1d(np.arange(body.mesh.size), self._fixed)
-        held = previous is not None and previous.torn.decomposition is torn.decomposition
-        if previous is not None and held and previous.torn.subdomains[0].matrix is body.matrix:
+        if previous is not None and previous._holds(torn):
             self._factor = previous._factor
             return
         with (timer or PhaseTimer()).phase("factor"):
             free = self._stiffness[self._free][:, self._free].tocsr()
-            self._factor = Factor(free) if len(self._free) else None
+            self._factor = Factor(free) if len(self._free) else NoFactor()
             # Loads that do no work on motions without energy have an answer, as one row of C3D20R has.
-            if self._factor is not None and (words := self._factor.doubt(free)):
+            if words := self._factor.doubt(free):
                 safe_log(_LOG.warning, "displacements may contain motions without energy: %s", words)
+
+    def _holds(self, torn: TornSystem) -> bool:
+        """Return whether another system has the same matrix and supports."""
+        same = self.torn.decomposition is torn.decomposition
+        return same and self.torn.subdomains[0].matrix is torn.subdomains[0].matrix
 
     @property
     def _stiffness(self) -> sp.csr_matrix:
         """K along the axes of nodes."""
         (body,) = self.torn.subdomains
-        stiffness, turn = body.stiffness, self._turn
-        return stiffness if turn is None else (turn @ stiffness @ turn.T).tocsr()
+        return self._axes.matrix(body.stiffness)
 
     def solve(self) -> DirectSolution:
         """Return the displacement under the present load, refined once."""
-        stiffness, load, free = self._stiffness, self.torn.load, self._free
-        load = load if self._turn is None else self._turn @ load
+        stiffness, load, free = self._stiffness, self._axes.turned(self.torn.load), self._free
         displacement = np.zeros(len(load))
         displacement[self._fixed] = self.torn.right
         moved = stiffness @ displacement
@@ -101,15 +103,13 @@ class DirectSystem:
                 "cells are too flat, or its materials too different for double precision"
             )
         reaction, residual = missing[self._fixed], float(np.linalg.norm(missing[free]) / scale)
-        if self._turn is not None:
-            displacement = self._turn.T @ displacement
-        return DirectSolution(displacement, reaction, residual)
+        return DirectSolution(self._axes.back(displacement), reaction, residual)
 
     def energy_of_residual(self, displacement: np.ndarray) -> float:
         """Return rᵀK⁻¹r of the free components, r = f − K u: the energy norm of the error, squared."""
         (body,) = self.torn.subdomains
         missing = self.torn.load - body.stiffness @ displacement
-        return self._energy(missing if self._turn is None else self._turn @ missing)
+        return self._energy(self._axes.turned(missing))
 
     def _energy(self, missing: np.ndarray) -> float:
         return float(missing[self._free] @ self._moved_by(missing[self._free]))
@@ -117,8 +117,7 @@ class DirectSystem:
     def _moved_by(self, force: np.ndarray) -> np.ndarray:
         """Return K⁻¹ times forces on the free components."""
         displacement = np.empty(len(self._free))
-        if self._factor is not None:
-            self._factor.solve(force, displacement)
+        self._factor.solve(force, displacement)
         return displacement
 
     def conforming(self, displacement: np.ndarray) -> np.ndarray:
@@ -130,15 +129,57 @@ class DirectSystem:
         return np.asarray(self.torn.B.T @ multiplier)
 
 
-def _turned(torn: TornSystem) -> sp.csr_matrix | None:
-    """Return the matrix that turns vectors of the one subdomain into the axes of nodes, None without any."""
+class _Axes:
+    """The axes of nodes along which components are held: those of the coordinates."""
+
+    def turned(self, vector: np.ndarray) -> np.ndarray:
+        """Return components along the axes."""
+        return vector
+
+    def back(self, turned: np.ndarray) -> np.ndarray:
+        """Return components along the coordinates."""
+        return turned
+
+    def matrix(self, stiffness: sp.csr_matrix) -> sp.csr_matrix:
+        """Return a matrix of components along the axes."""
+        return stiffness
+
+    def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
+        """Return rows on components along the axes."""
+        return B
+
+
+@dataclass(frozen=True, eq=False)
+class _TurnedAxes(_Axes):
+    """Axes that are turned.
+
+    `turn`: what turns vectors into them.
+    """
+
+    turn: sp.csr_matrix
+
+    def turned(self, vector: np.ndarray) -> np.ndarray:
+        return np.asarray(self.turn @ vector)
+
+    def back(self, turned: np.ndarray) -> np.ndarray:
+        return np.asarray(self.turn.T @ turned)
+
+    def matrix(self, stiffness: sp.csr_matrix) -> sp.csr_matrix:
+        return (self.turn @ stiffness @ self.turn.T).tocsr()
+
+    def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
+        return _rounded(B @ self.turn.T)
+
+
+def _axes_of(torn: TornSystem) -> _Axes:
+    """Return the axes of the nodes of the one subdomain."""
     axes = torn.decomposition.axes
     if not axes:
-        return None
+        return _Axes()
     (mesh,) = torn.decomposition.meshes
     block = np.argsort(mesh.nodes)[axes.nodes]  # the one body has all nodes, in blocks of another order
     order = np.argsort(block)
-    return LocalAxes(block[order], axes.axes[order]).matrix(len(mesh.nodes))
+    return _TurnedAxes(LocalAxes(block[order], axes.axes[order]).matrix(len(mesh.nodes)))
 
 
 def _rounded(matrix: sp.csr_matrix) -> sp.csr_matrix:

@@ -46,12 +46,14 @@ class Factor:
         dispose_with(self, self._factor, self._right, self._left)
 
     @classmethod
-    def of_stiffness(cls, matrix: sp.csr_matrix, worst: float = 0.02) -> Factor:
-        """Factor a stiffness that resists every motion.
+    def of_stiffness(cls, matrix: sp.csr_matrix, worst: float = 0.02) -> Factor | NoFactor:
+        """Factor a stiffness that resists every motion, or one without rows.
 
         Pivots that are rounding may be positive: a solution shows them. `worst`: error of a solution, see
         `error_of_a_solution`, that is refused.
         """
+        if matrix.shape[0] == 0:
+            return NoFactor()
         factor = cls(matrix)
         if words := factor.doubt(matrix, worst):
             raise InvalidInputError(f"a factored stiffness must resist every motion, but {words}")
@@ -113,6 +115,23 @@ class Factor:
         given.destroy()
         solutions.destroy()
         return solution
+
+
+class NoFactor:
+    """The factor of a matrix without rows."""
+
+    entries = 0
+
+    def doubt(self, matrix: sp.csr_matrix) -> str:
+        """Return nothing."""
+        return ""
+
+    def solve(self, right: np.ndarray, out: np.ndarray) -> None:
+        """Write nothing."""
+
+    def solve_many(self, right: np.ndarray) -> np.ndarray:
+        """Return no rows."""
+        return right
 
 
 def require_factored(factor: PETSc.Mat) -> None:

@@ -68,7 +68,7 @@ class ExplicitOperator:
         self._inside = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
         rows = stiffness[self._inside]
         self._K_ib, self._K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
-        self._inner = Factor.of_stiffness(rows[:, self._inside].tocsr()) if len(self._inside) else None
+        self._inner = Factor.of_stiffness(rows[:, self._inside].tocsr())
 
     @property
     def flops(self) -> tuple[int, int]:
@@ -168,7 +168,7 @@ class ExplicitOperator:
     def _solve_inside(self, right: np.ndarray) -> np.ndarray:
         """Return K_ii⁻¹ times a vector on the inside."""
         solution = np.zeros_like(right)
-        if self._inner is not None and right.any():
+        if right.any():
             self._inner.solve(right, solution)
         return solution
 
@@ -212,7 +212,7 @@ class FactoredOperator:
     pays_from = 4
 
     def __init__(
-        self, stiffness: sp.csr_matrix, interface: np.ndarray, whole: Inverse, inside: Inverse | None
+        self, stiffness: sp.csr_matrix, interface: np.ndarray, whole: Inverse, inside: Inverse
     ) -> None:
         """Keep the factors and the blocks that couple the interface."""
         self._interface, self._factor, self._inside = interface, whole, inside
@@ -226,8 +226,7 @@ class FactoredOperator:
     @property
     def flops(self) -> tuple[int, int]:
         """Floating point operations of `flex` and of `stiffen`: two for each entry and substitution."""
-        inside = 0 if self._inside is None else self._inside.entries
-        return 4 * self._factor.entries, 4 * inside + 2 * self._K_bb.nnz + 4 * self._K_bi.nnz
+        return 4 * self._factor.entries, 4 * self._inside.entries + 2 * self._K_bb.nnz + 4 * self._K_bi.nnz
 
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write the inverse on the interface times a force there into ``displacement``."""
@@ -241,9 +240,8 @@ class FactoredOperator:
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write the Schur complement times an interface displacement into ``force``."""
         force[:], pulled = self._forces(displacement)
-        if self._inside is not None:
-            self._inside.solve(pulled, self._inner)
-            force -= self._forces_from_inside(self._inner)
+        self._inside.solve(pulled, self._inner)
+        force -= self._forces_from_inside(self._inner)
 
     def _forces(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the forces of an interface displacement, on the interface and inside."""
@@ -273,8 +271,7 @@ class FactoredOperator:
     def stiffen_all(self, displacements: np.ndarray) -> np.ndarray:
         """Return the Schur complement times several interface displacements, the rows, shape (k, n_b)."""
         force, pulled = self._forces(displacements.T)
-        if self._inside is not None:
-            force -= self._forces_from_inside(self._inside.solve_many(pulled))
+        force -= self._forces_from_inside(self._inside.solve_many(pulled))
         return np.asarray(force.T)
 
     def invert(self, right: np.ndarray) -> np.ndarray:
@@ -309,7 +306,7 @@ class ImplicitOperator(FactoredOperator):
             stiffness,
             interface,
             Factor.of_stiffness(regularised(stiffness, subdomain.kernel, subdomain.points)),
-            Factor.of_stiffness(stiffness[inside][:, inside].tocsr()) if len(inside) else None,
+            Factor.of_stiffness(stiffness[inside][:, inside].tocsr()),
         )
 
 
