@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 
 from fenics_contact._adaptive.levels import (
@@ -18,7 +17,7 @@ from fenics_contact._adaptive.quantities import quantity as named
 from fenics_contact._base.libraries import MPI
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.problem import ContactProblem
-from fenics_contact._equilibrium.steps import require_steps
+from fenics_contact._equilibrium.steps import require_steps, timed
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.design.objective import Objective
 from fenics_contact.errors import collectively, together
@@ -81,10 +80,9 @@ def solve_steps_to(
     results: list[AccurateResult] = []
     last: _StepLoop | None = None
     for number, step in enumerate(steps, start=1):
-        timed = step if step.time is not None else replace(step, time=float(number))
         with together(comm):
             scene = step.applied_to(scene)
-        last = _StepLoop(timed, last, objective, relative_error, limits or Limits(), comm)
+        last = _StepLoop(timed(step, number), last, objective, relative_error, limits or Limits(), comm)
         show = None if callback is None else partial(callback, step)
         results.append(followed(last, ContactProblem(scene, comm, solver=solver, tolerance=tolerance), show))
     return tuple(results)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,38 +28,29 @@ from fenics_contact.errors import InvalidInputError
 
 @dataclass(frozen=True)
 class _Where:
-    """What was given with a name.
-
-    `radius`: that of a mean near a place; by default a fraction of the body's size.
-    """
+    """What was given with a name, by the names of arguments."""
 
     scene: Scene
-    surface: str | None
-    body: str | None
-    at: Sequence[float] | None
-    direction: Sequence[float] | None
-    component: str | None
-    radius: float | None
+    given: Mapping[str, Any]
 
     def pair(self) -> int | None:
         """Return the number of the pair that was named by a surface, None for all."""
-        return None if self.surface is None else pair_number(self.scene.contacts, self.surface)
+        return pair_number(self.scene.contacts, self.given["surface"]) if "surface" in self.given else None
 
     def one_pair(self) -> int:
         """Return the number of a pair; the only one needs no name."""
         contacts = self.scene.contacts
-        if self.surface is None and len(contacts) == 1:
+        if "surface" not in self.given and len(contacts) == 1:
             return 0
         return pair_number(contacts, self._given("surface", [pair.place for pair in contacts]))
 
     def _given(self, name: str, known: Sequence[str]) -> str:
-        value = getattr(self, name)
-        if value is None:
+        if name not in self.given:
             raise InvalidInputError(
                 f"this quantity needs a {name}, one of {', '.join(map(repr, known)) or 'none'}: "
                 f"give {name}=..."
             )
-        return str(value)
+        return str(self.given[name])
 
     def body_and_surface(self) -> tuple[str, str]:
         """Return both, of a surface in words such as "block top"."""
@@ -79,7 +70,7 @@ class _Where:
     def one_body(self) -> str:
         """Return the name of a body; the only one needs none."""
         bodies = list(self.scene.bodies)
-        name = bodies[0] if self.body is None and len(bodies) == 1 else self._given("body", bodies)
+        name = bodies[0] if "body" not in self.given and len(bodies) == 1 else self._given("body", bodies)
         if name not in bodies:
             raise InvalidInputError(
                 f"a quantity needs a body of the scene, got {name!r}, which has "
@@ -89,32 +80,31 @@ class _Where:
 
     def along(self) -> tuple[float, ...]:
         """Return the direction."""
-        if self.direction is None:
+        if "direction" not in self.given:
             axes = np.eye(self.scene.dim, dtype=int).tolist()
             raise InvalidInputError(
                 f"this quantity needs a direction, such as {tuple(axes[0])} or {tuple(axes[-1])}: give "
                 "direction=..."
             )
-        return tuple(map(float, np.ravel(np.array(self.direction))))
+        return tuple(map(float, np.ravel(np.array(self.given["direction"]))))
 
     def near(self, fraction: float = 0.05) -> tuple[str, tuple[float, ...], float]:
         """Return body, place and radius of a mean; `fraction`: of the longest side of the body's box."""
         body = self.one_body()
-        assert self.at is not None
         size = float(np.ptp(self.scene.bodies[body].mesh.points, axis=0).max())
-        return body, tuple(map(float, self.at)), fraction * size if self.radius is None else self.radius
+        return body, tuple(map(float, self.given["at"])), self.given.get("radius", fraction * size)
 
 
 def _displacement(where: _Where) -> Objective:
-    if where.at is None:
+    if "at" not in where.given:
         return Movement(*where.body_and_surface(), where.along())
     return MovementNear(*where.near(), direction=where.along())
 
 
 def _stress(where: _Where) -> Objective:
-    if where.at is None:
+    if "at" not in where.given:
         return LargestStress(where.one_body())
-    return StressNear(*where.near(), where.component or "von_mises")
+    return StressNear(*where.near(), where.given.get("component") or "von_mises")
 
 
 #: Name -> what it takes, and the quantity.
@@ -189,13 +179,14 @@ def quantity(
             f"LargestPressure(), got {name!r}"
         )
     taken, made = QUANTITIES[name]
-    given: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         "surface": surface, "body": body, "at": at, "direction": direction, "component": component,
         "radius": radius,
     }  # fmt: skip
-    unused = [key for key, value in given.items() if value is not None and key not in taken]
+    given = {key: value for key, value in arguments.items() if value is not None}
+    unused = [key for key in given if key not in taken]
     if unused:
         raise InvalidInputError(
             f"{name} takes {' and '.join(taken) or 'nothing else'}, got {' and '.join(unused)}: leave it out"
         )
-    return made(_Where(scene, **given))
+    return made(_Where(scene, given))

@@ -72,37 +72,52 @@ def stored_by_joints(scene: Scene) -> dict[str, np.ndarray]:
     return {name: values for kind in JOINTS for name, values in kind.stored(scene).items()}
 
 
-class StepCheckpoint:
-    """Reads the states of completed steps and writes new ones; does nothing without a checkpoint."""
+def timed(step: LoadStep, number: int) -> LoadStep:
+    """Return a load step with its time, by default its number, from 1."""
+    return step if step.time is not None else replace(step, time=float(number))
 
-    def __init__(self, checkpoint: Checkpoint | None, problem: ContactProblem) -> None:
+
+class StepCheckpoint:
+    """No checkpoint: every step is solved, and none is kept."""
+
+    @classmethod
+    def of(cls, checkpoint: Checkpoint | None, problem: ContactProblem) -> StepCheckpoint:
+        """Return what keeps the states of steps; a file is read if it exists. Collective."""
+        return cls() if checkpoint is None else StepsInFile(checkpoint, problem)
+
+    def recalled(self, step: LoadStep, scene: Scene, problem: ContactProblem) -> AnyState | None:
+        """Return the state after the next step if it is stored, else None. Collective."""
+        return None
+
+    def keep(self, step: LoadStep, state: AnyState) -> None:
+        """Add the state after a step and write it if that is due. Collective."""
+
+    def write(self) -> None:
+        """Write all steps unless the file holds them. Collective."""
+
+    def write_rest(self) -> None:
+        """Write the completed steps in the middle of a step, if that needs no other rank."""
+
+    def summary(self, done: int, count: int | None) -> str:
+        """Describe what a run that ends now leaves, and how to continue it."""
+        return without_checkpoint(counted(done, "load step"))
+
+
+class StepsInFile(StepCheckpoint):
+    """Reads the states of completed steps and writes new ones."""
+
+    def __init__(self, checkpoint: Checkpoint, problem: ContactProblem) -> None:
         """Read the file if it exists. Collective."""
         self._checkpoint, self._comm = checkpoint, problem.comm
-        self._arrays: dict[str, np.ndarray] = {}
         self._fingerprint: dict[str, str] = {}
-        self._here, self._stored, self._written = 0, 0, 0
-        if checkpoint is None:
-            return
         names = ("scene", "partitions", "solver", "tolerance")
         for name in (*names, *(("steps",) if problem.scene.is_nonlinear else ())):
             self._fingerprint.update(described(getattr(problem, name), name))
-        arrays = checkpoint.read(KIND, self._fingerprint, problem.comm)
-        if arrays is not None:
-            self._stored = self._written = int(arrays.pop("steps"))
-            self._arrays = arrays
+        self._arrays = checkpoint.read(KIND, self._fingerprint, problem.comm) or {"steps": np.array(0)}
+        self._here, self._stored = 0, int(self._arrays.pop("steps"))
+        self._written = self._stored
 
-    @property
-    def recalling(self) -> bool:
-        """Whether the last step was read from the file."""
-        return self._here <= self._stored
-
-    def recalled(
-        self,
-        step: LoadStep,
-        scene: Scene,
-        problem: ContactProblem,
-    ) -> AnyState | None:
-        """Return the state after the next step if it is stored, else None. Collective."""
+    def recalled(self, step: LoadStep, scene: Scene, problem: ContactProblem) -> AnyState | None:
         if self._here >= self._stored:
             return None
         names = [name for name in self._arrays if name.startswith(self._prefix)]
@@ -119,9 +134,6 @@ class StepCheckpoint:
         return problem.state
 
     def keep(self, step: LoadStep, state: AnyState) -> None:
-        """Add the state after a step and write it if that is due. Collective."""
-        if self._checkpoint is None:
-            return
         self._arrays[f"{self._prefix}step"] = np.array(json.dumps(described(step, "step")))
         for name, values in stored_state(state).items():
             self._arrays[f"{self._prefix}{name}"] = values
@@ -130,22 +142,17 @@ class StepCheckpoint:
             self.write()
 
     def write(self) -> None:
-        """Write all steps unless the file holds them. Collective."""
-        if self._checkpoint is not None and self._here > self._written:
+        if self._here > self._written:
             arrays = {"steps": np.array(self._here), **self._arrays}
             self._checkpoint.write(KIND, self._fingerprint, arrays, self._comm)
             self._written = self._here
 
     def write_rest(self) -> None:
-        """Write the completed steps in the middle of a step, if that needs no other rank."""
         if self._comm.size == 1:
             with suppress(CheckpointError):
                 self.write()
 
     def summary(self, done: int, count: int | None) -> str:
-        """Describe what a run that ends now leaves, and how to continue it."""
-        if self._checkpoint is None:
-            return without_checkpoint(counted(done, "load step"))
         number = self._written
         words = f"{number} of {count}" if count is not None else f"{number}"
         steps = "load step" if (count or number) == 1 else "load steps"
@@ -203,7 +210,7 @@ class LoadSequence:
         require_alike(
             self._comm, described({"count": count, "checkpoint (every, resume)": settings}, "steps")
         )
-        self._done = StepCheckpoint(checkpoint, problem)
+        self._done = StepCheckpoint.of(checkpoint, problem)
         self._task, self._count, self._number = Task("load steps", unit="done", total=count), count, 0
 
     def _facts(self) -> dict[str, Any]:
@@ -261,8 +268,7 @@ class LoadSequence:
         scene = with_kept(scene, self.state)
         state = self._done.recalled(step, scene, self.problem)
         if state is None:
-            time = self._number + 1.0 if step.time is None else step.time
-            state = self.problem.solve(scene, before=self.state, step=replace(step, time=time))
+            state = self.problem.solve(scene, before=self.state, step=timed(step, self._number + 1))
             self._done.keep(step, state)
         self.scene = scene
         return state

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any
@@ -52,6 +52,75 @@ class JointProblem(DesignProblem[JointPoint]):
         return {f"{name}.{key}": text for name, each in known.items() for key, text in each.items()}
 
 
+class _LargestCase:
+    """The largest of several objectives, by the name of their cases."""
+
+    in_words = "largest"
+    #: Sum of the factors on objectives.
+    size = 1.0
+
+    def check(self, cases: Mapping[str, object]) -> None:
+        """Reject what does not fit the cases."""
+
+    def active(self, values: Mapping[str, float]) -> list[str]:
+        """Return the load cases that contribute to the subgradient."""
+        return [max(values, key=values.__getitem__)]
+
+    def value(self, values: Mapping[str, float]) -> float:
+        """Return the objective of all."""
+        return max(values.values())
+
+    def gradient(self, values: Mapping[str, float], gradients: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return a subgradient, from the gradients of those that contribute at least."""
+        return gradients[self.active(values)[0]]
+
+    def error(self, errors: Mapping[str, float]) -> float:
+        """Return the estimated error of the objective."""
+        return max(errors.values())
+
+    def others(self, known: Callable[[], JointPoint | None]) -> list[DesignPoint]:
+        """Return the cases beside the largest of the design evaluated last. Collective."""
+        point = known()
+        return sorted(point.parts.values(), key=lambda each: -each.value)[1:] if point else []
+
+
+class _SumOfCases(_LargestCase):
+    """The sum of weighted objectives."""
+
+    def __init__(self, weights: dict[str, float]) -> None:
+        self._weights, self.in_words = weights, f"weighted sum, {weights}"
+
+    def check(self, cases: Mapping[str, object]) -> None:
+        if set(self._weights) != set(cases):
+            raise InvalidInputError(
+                f"LoadCases.weights must name the cases {sorted(cases)}, got {sorted(self._weights)}: give "
+                "each a weight, or none for the largest"
+            )
+        if not np.isfinite(list(self._weights.values())).all():
+            raise InvalidInputError(
+                f"LoadCases.weights must be finite numbers, got {self._weights}: give numbers such as 0.5"
+            )
+
+    @property
+    def size(self) -> float:  # type: ignore[override]
+        return sum(map(abs, self._weights.values())) or 1.0
+
+    def active(self, values: Mapping[str, float]) -> list[str]:
+        return list(values)
+
+    def value(self, values: Mapping[str, float]) -> float:
+        return sum(self._weights[name] * values[name] for name in values)
+
+    def gradient(self, values: Mapping[str, float], gradients: Mapping[str, np.ndarray]) -> np.ndarray:
+        return np.asarray(sum(self._weights[name] * gradients[name] for name in gradients))
+
+    def error(self, errors: Mapping[str, float]) -> float:
+        return sum(abs(self._weights[name]) * errors[name] for name in errors)
+
+    def others(self, known: Callable[[], JointPoint | None]) -> list[DesignPoint]:
+        return []
+
+
 @displayed
 class LoadCases(JointProblem):
     """J(α) = max J_k(α) over load cases of one design, or Σ w_k J_k(α), with a subgradient.
@@ -87,7 +156,8 @@ class LoadCases(JointProblem):
             InvalidInputError: If there is no case, a weight is missing or no finite number, or the problems
                 do not share their designs.
         """
-        self.problems, self.weights = dict(problems), None if weights is None else dict(weights)
+        self.problems, self.weights = dict(problems), weights
+        self._total = _LargestCase() if weights is None else _SumOfCases(dict(weights))
         if not self.problems:
             raise InvalidInputError("LoadCases needs a problem, got none: give {'name': problem}")
         self._memory = record_of_values(self._at)
@@ -100,24 +170,10 @@ class LoadCases(JointProblem):
                         f"load cases must share designs and meshes, {name!r} shares nothing with "
                         f"{next(iter(self.problems))!r}: make it by problem.case(scene)"
                     )
-            self._check_weights()
-
-    def _check_weights(self) -> None:
-        if self.weights is None:
-            return
-        if set(self.weights) != set(self.problems):
-            raise InvalidInputError(
-                f"LoadCases.weights must name the cases {sorted(self.problems)}, got {sorted(self.weights)}: "
-                "give each a weight, or none for the largest"
-            )
-        if not np.isfinite(list(self.weights.values())).all():
-            raise InvalidInputError(
-                f"LoadCases.weights must be finite numbers, got {self.weights}: give numbers such as 0.5"
-            )
+            self._total.check(self.problems)
 
     def _facts(self) -> dict[str, Any]:
-        how = "largest" if self.weights is None else f"weighted sum, {self.weights}"
-        return {"cases": list(self.problems), "objective": how, "first": self._parts[0]}
+        return {"cases": list(self.problems), "objective": self._total.in_words, "first": self._parts[0]}
 
     @property
     def inexact(self) -> bool:
@@ -133,8 +189,7 @@ class LoadCases(JointProblem):
         Returns:
             Values, shape (k,), and gradients, shape (k, size); none of a weighted sum.
         """
-        known = None if self.weights is not None else self.known(alpha)
-        points = sorted(known.parts.values(), key=lambda each: -each.value)[1:] if known else []
+        points = self._total.others(lambda: self.known(alpha))
         gradients = np.array([each.gradient for each in points]).reshape(len(points), self.size)
         return np.array([each.value for each in points]), gradients
 
@@ -146,9 +201,8 @@ class LoadCases(JointProblem):
 
     def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
         """Return J(α), a subgradient and the estimated error of J, see `ShapeProblem.within`. Collective."""
-        share = 1.0 if self.weights is None else sum(map(abs, self.weights.values())) or 1.0
         for problem in self.problems.values():
-            problem.within(alpha, value / share, subgradient)
+            problem.within(alpha, value / self._total.size, subgradient)
         point = self._at(alpha)
         self._memory.record(point)
         return point.value, point.gradient, point.error
@@ -169,15 +223,16 @@ class LoadCases(JointProblem):
         """Return whether the last result, at α, may not be a subgradient. Collective."""
         known = self.known(alpha)
         return known is not None and any(
-            known.parts[name].weak.may_be_invalid for name in self._active(_values(known))
+            known.parts[name].weak.may_be_invalid for name in self._total.active(_values(known))
         )
 
     def gradient_near(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Return a gradient near α, see `ShapeProblem.gradient_near`. Collective."""
         known = self.known(alpha)
-        names = self._active(self.values_of(alpha) if known is None else _values(known))
+        values = self.values_of(alpha) if known is None else _values(known)
+        names = self._total.active(values)
         gradients = {name: self.problems[name].gradient_near(alpha, end) for name in names}
-        return gradients[names[0]] if self.weights is None else self._sum(gradients)
+        return self._total.gradient(values, gradients)
 
     def fingerprint(self) -> dict[str, str]:
         """Identify the problem, for a checkpoint."""
@@ -190,23 +245,11 @@ class LoadCases(JointProblem):
     def _joined(self, parts: Mapping[str, DesignPoint]) -> JointPoint:
         values = {name: part.value for name, part in parts.items()}
         errors = {name: part.error for name, part in parts.items()}
-        names = self._active(values)
+        gradients = {name: part.gradient for name, part in parts.items()}
+        names, total = self._total.active(values), self._total
         first, weak = parts[names[0]], WeakPoints.joined([parts[name].weak for name in names])
-        if self.weights is None:
-            return JointPoint(first.alpha, first.value, first.gradient, weak, parts, max(errors.values()))
-        gradient = self._sum({name: part.gradient for name, part in parts.items()})
-        error = self._sum(errors, absolute=True)
-        return JointPoint(first.alpha, self._sum(values), gradient, weak, parts, error)
-
-    def _sum(self, parts: Mapping[str, Any], *, absolute: bool = False) -> Any:
-        assert self.weights is not None
-        return sum(
-            (abs(self.weights[name]) if absolute else self.weights[name]) * parts[name] for name in parts
-        )
-
-    def _active(self, values: Mapping[str, float]) -> list[str]:
-        """Return the load cases that contribute to the subgradient, from their values."""
-        return list(self.problems) if self.weights is not None else [max(values, key=values.__getitem__)]
+        gradient = total.gradient(values, gradients)
+        return JointPoint(first.alpha, total.value(values), gradient, weak, parts, total.error(errors))
 
 
 def _values(point: JointPoint) -> dict[str, float]:
