@@ -30,7 +30,6 @@ from fenics_contact._optimize.problem import pose
 from fenics_contact._optimize.result import Result, StepKind
 from fenics_contact.design.memory import DesignPoint
 from fenics_contact.design.problem import ShapeProblem
-from fenics_contact.design.sensitivity import products_of
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.mesh.cell_types import CELL_TYPES
@@ -197,14 +196,14 @@ class _Descent(AdaptiveLoop):
             state = shape.begin(self._x, self._best.state, self._refinements)
         else:
             state = shape.state_of(self._x)
-        before = products_of(state)
+        before = state.products
         tolerance = self._enough(state)
-        estimated = products_of(state) - before
+        estimated = state.products - before
         result = self._minimised(shape, tolerance)
         self.optimisations.append(result)
         self._x, self._settings["restore"] = result.x, True
         self._best = shape.at(result.x)
-        self._earlier = shape.products + estimated - products_of(self._best.state)
+        self._earlier = shape.products + estimated - self._best.state.products
         return self._best.state
 
     def _on(self, contact: ContactProblem) -> ShapeProblem:
@@ -257,7 +256,7 @@ class _Descent(AdaptiveLoop):
     @property
     def _products(self) -> int:
         """Products with F of states, adjoints and estimates of the last mesh."""
-        return self._earlier + products_of(self._state)
+        return self._earlier + self._state.products
 
     def _error(self, missing: float, value: float, *bounds: float) -> float:
         """Return the error of the least objective: of its mesh, and what the method was allowed to leave."""

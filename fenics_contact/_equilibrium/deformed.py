@@ -14,7 +14,7 @@ from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.other_rows import prescribed_as_is
 from fenics_contact._equilibrium.outer_loops import outer_loops
-from fenics_contact._equilibrium.previous import ONLY_STEP, Previous, Wanted
+from fenics_contact._equilibrium.previous import ONLY_STEP, AfterTransfer, Previous, Wanted
 from fenics_contact._equilibrium.starts import CoarseStart, carried_over
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
@@ -84,9 +84,9 @@ class DeformedEquilibria:
 
     def solve(self, scene: Scene, previous: Previous, wanted: Wanted, most: int = 4) -> DeformedState:
         """Compute the equilibrium of a scene. Collective."""
-        places, in_later_step = _places_of(previous.before, scene.dim), previous.before is not None
-        inside, state = InsideFacets(scene.dim, on_the_way=in_later_step), None
-        overlap = wanted.design or previous.is_coarser
+        places = _places_of(previous.before.here, scene.dim)
+        inside, state = InsideFacets(scene.dim, on_the_way=bool(previous.last)), None
+        overlap = wanted.design or previous.start.is_coarser
         for _ in range(1 + (0 if overlap else most)):
             self._put_inside(places)
             try:
@@ -118,7 +118,7 @@ class DeformedEquilibria:
             start = self._start(scene, previous)
         self._require_later(scene, start.time, wanted.time)
         with timer.phase("assemble"):
-            overlap = wanted.design or previous.is_coarser
+            overlap = wanted.design or previous.start.is_coarser
             load = self._loading(scene, wanted.time, wanted.step, overlap)
             acted, load = start.loads(load, equations.contact)
             if self._unresisted is None:  # supports stay what they are in later steps
@@ -147,8 +147,8 @@ class DeformedEquilibria:
         before = previous.last
         if not isinstance(before, DeformedState):
             return _FromRest()
-        if isinstance(previous.before, TransferredState):
-            return _FromState(before, *self._on_meshes_of(scene, previous.before), None)
+        if isinstance(previous.before, AfterTransfer):
+            return _FromState(before, *self._on_meshes_of(scene, before, previous.before.before), None)
         same = before.torn.decomposition is self.decomposition
         same = same and self._places.are_those_of(_places_of(before, scene.dim))
         if not (same and contacts_alike(scene, before.scene)):
@@ -215,10 +215,10 @@ class DeformedEquilibria:
                 f"after {earlier:g}: give later times, or none"
             )
 
-    def _on_meshes_of(self, scene: Scene, carried: TransferredState) -> tuple[Loading, Configuration]:
+    def _on_meshes_of(
+        self, scene: Scene, before: DeformedState, carried: TransferredState
+    ) -> tuple[Loading, Configuration]:
         """Return what acted in a state on other meshes and where it ended, on a scene's. Collective."""
-        before = carried.state
-        assert isinstance(before, DeformedState)
         acted = self._loading(carried.scene_on(scene), before.time, overlap=True)
         at, moved = before.equilibrium.configuration, carried.fields.displacement(acted.torn)
         contact = self._equations.contact.first(acted, moved)
@@ -341,7 +341,7 @@ def _as_accurate_as(wanted: Wanted, steps: AutomaticSteps) -> AutomaticSteps:
     return replace(steps, newton=replace(steps.newton, tolerance=tolerance))
 
 
-def _places_of(before: State | TransferredState | None, dim: int) -> InFacets:
+def _places_of(before: State | None, dim: int) -> InFacets:
     """Return the places inside facets of a state before, by key, none on other meshes."""
     if not isinstance(before, DeformedState):
         return InFacets.none(dim)

@@ -15,7 +15,7 @@ from fenics_contact._equilibrium.outer_loops import OuterLoop, nested, outer_loo
 from fenics_contact._equilibrium.passes import Passes
 from fenics_contact._equilibrium.previous import Previous, Wanted
 from fenics_contact._equilibrium.starts import (
-    first_guess,
+    SameMeshes,
     known_system,
     solve_from_coarse,
 )
@@ -35,7 +35,7 @@ from fenics_contact.qp.solution import DualSolution
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.contact import no_contact
 from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
-from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.linear_state import DirectState, LinearState
 from fenics_contact.results.state import State, compute_energies
 
 if TYPE_CHECKING:
@@ -65,12 +65,11 @@ class DirectEquilibria:
         return self._directly(_again(scene, self._decomposition, known), known)
 
     def _directly(self, torn: TornSystem, known: State | None) -> LinearState:
-        earlier = known.system if isinstance(known, LinearState) else None
-        reused = earlier if isinstance(earlier, DirectSystem) else None
+        reused = known.system if isinstance(known, DirectState) else None
         system = DirectSystem(torn, self._timer, previous=reused)
         with self._timer.phase("solve"):
             solution = system.solve()
-        return LinearState(
+        return DirectState(
             torn=torn, system=system, solution=solution, torn_displacement=solution.displacement,
             contact=no_contact(torn.points), seconds=dict(self._timer.seconds),
             energies=compute_energies(torn, solution.displacement, solution.multiplier, 0.0),
@@ -91,7 +90,7 @@ class LinearEquilibria:
         """Compute the equilibrium of a scene. Collective."""
         with self._timer.phase("assemble"):
             torn = _torn(scene, self._decomposition, previous, wanted)
-            torn = _checked(previous.with_slip(torn), previous.known)
+            torn = _checked(previous.before.with_slip(torn), previous.known)
         state = self._solved(torn, previous, wanted)
         if wanted.design or scene.torsion or not scene.contacts:
             return state
@@ -103,7 +102,7 @@ class LinearEquilibria:
         """Return the state in which facets press that lie between nodes in a master. Collective."""
 
         def solved(torn: TornSystem, last: LinearState | None) -> LinearState:
-            return self._solved(torn, replace(previous, start=last, known=None), wanted)
+            return self._solved(torn, replace(previous, start=SameMeshes(last or state), known=None), wanted)
 
         torn, passes, inside = state.torn, Passes(solved, None), InsideFacets(state.scene.dim)
         passes.add(state)
@@ -113,7 +112,7 @@ class LinearEquilibria:
             if places is None:
                 break
             with self._timer.phase("assemble"):
-                others = previous.with_slip(with_places(torn, places))
+                others = previous.before.with_slip(with_places(torn, places))
             state = passes.run(others)
         return state if passes.count == 1 else passes.answer(state)
 
@@ -133,8 +132,8 @@ class LinearEquilibria:
         reused = known_system(previous.known)
         system = DualSystem(torn, self._timer, previous=reused)
         with self._timer.phase("solve"):
-            first = first_guess(previous.start, system)
-        alone = solve_from_coarse if previous.is_coarser else solve_dual
+            first = previous.start.first_guess(system)
+        alone = solve_from_coarse if previous.start.is_coarser else solve_dual
         solve = alone if reused is None else FollowedLoads(reused, self._timer).solve
         if not isinstance(tolerance, float):
             return self._balanced(system, solve, solver, tolerance, first)
@@ -153,7 +152,7 @@ class LinearEquilibria:
             reused = known_system(last)
             system = DualSystem(system_of, self._timer, previous=reused)
             with self._timer.phase("solve"):
-                first = first_guess(last or previous.start, system)
+                first = (SameMeshes(last) if last else previous.start).first_guess(system)
                 solution = solve_dual(system, solver.with_tolerance(finest), first)
             return self._state(system, solution, tolerance=wanted)
 
@@ -217,7 +216,7 @@ def default_solver(kind: SolverKind) -> DualSolver:
 
 def _torn(scene: Scene, decomposition: Decomposition, previous: Previous, wanted: Wanted) -> TornSystem:
     # What the facets of a coarse mesh explained, a finer one has kept: a warning names it.
-    return _again(scene, decomposition, previous.known, overlap=wanted.design or previous.is_coarser)
+    return _again(scene, decomposition, previous.known, overlap=wanted.design or previous.start.is_coarser)
 
 
 def _again(

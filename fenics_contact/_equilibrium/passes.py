@@ -7,9 +7,8 @@ from dataclasses import replace
 
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.qp.solution import DualSolution, SolverStep, continued
+from fenics_contact.qp.solution import SolverStep, continued
 from fenics_contact.results.linear_state import LinearState
-from fenics_contact.results.state import State
 
 #: Solves a system from the state before, if there is one.
 Solve = Callable[[TornSystem, LinearState | None], LinearState]
@@ -18,10 +17,10 @@ Solve = Callable[[TornSystem, LinearState | None], LinearState]
 class Passes:
     """Passes so far, each of which starts from the last."""
 
-    def __init__(self, solve: Solve, known: State | None) -> None:
-        """Start from a known state, if it is one of linear materials."""
+    def __init__(self, solve: Solve, known: LinearState | None) -> None:
+        """Start from a known state."""
         self._solve, self._products = solve, 0
-        self._state = known if isinstance(known, LinearState) else None
+        self._state = known
         self.count = 0
         self.history: list[SolverStep] = []
 
@@ -37,7 +36,7 @@ class Passes:
 
     def add(self, state: LinearState) -> None:
         """Count a state that was solved, from which the next pass starts."""
-        self._state, solution = state, _solution(state)
+        self._state, solution = state, state.dual_solution
         self.history = continued(self.history, solution.history, self._products)
         self._products += solution.products
         self.count += 1
@@ -49,15 +48,9 @@ class Passes:
     def answer(self, state: LinearState) -> LinearState:
         """Return a state with the steps and the products of all passes."""
         found = replace(
-            _solution(state),
+            state.dual_solution,
             history=tuple(self.history),
             iterations=len(self.history),
             products=self._products,
         )
         return replace(state, solution=found)
-
-
-def _solution(state: LinearState) -> DualSolution:
-    """Return what the dual solver found: systems that are repeated have contacts."""
-    assert isinstance(state.solution, DualSolution)
-    return state.solution

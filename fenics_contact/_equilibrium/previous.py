@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
-
-import numpy as np
 
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.other_rows import (
@@ -16,7 +14,7 @@ from fenics_contact._equilibrium.other_rows import (
     on_rows_of,
     with_kept,
 )
-from fenics_contact._equilibrium.starts import CoarseStart, checked_start
+from fenics_contact._equilibrium.starts import NoStart, checked_start
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.feti.torn import TornSystem, build_torn_system, with_points_inside
@@ -65,68 +63,104 @@ class Equilibria(Protocol):
         """Build a state from what was stored of it. Collective; `known`: of which parts may be reused."""
 
 
+class Undeformed:
+    """Bodies at rest, before the first load step."""
+
+    #: The state at the end of the load step before, also on other meshes.
+    last: State | None = None
+    #: The same on the meshes of the scene, from which its solution starts.
+    here: State | None = None
+
+    def check(self, scene: Scene) -> None:
+        """Reject what cannot be carried to the meshes of a scene."""
+
+    def kept(self, scene: Scene) -> Scene:
+        """Return a scene with what supports and joints keep from the load step before. Collective."""
+        return continued(scene, {})
+
+    def with_slip(self, torn: TornSystem) -> TornSystem:
+        """Return a system that measures slip from the load step before. Collective."""
+        return torn
+
+
+@dataclass(frozen=True, eq=False)
+class AfterState(Undeformed):
+    """A load step after a state on the meshes of the scene."""
+
+    last: State
+
+    @property
+    def here(self) -> State | None:  # type: ignore[override]
+        return self.last
+
+    def kept(self, scene: Scene) -> Scene:
+        return continued(with_kept(scene, self.last), kept_by_joints(self.last))
+
+    def with_slip(self, torn: TornSystem) -> TornSystem:
+        before = self.last
+        if has_rows_of(before, torn):
+            was, multiplier = before.torn, before.solution.multiplier
+            sticks = sticking(was, before.rows) if was.tangential_rows.size else False
+        else:
+            (was, multiplier), sticks = on_rows_of(before, torn), False
+        return torn.with_slip_from(*was.slip_origin(before.torn_displacement, multiplier, sticks))
+
+
+@dataclass(frozen=True, eq=False)
+class AfterTransfer(Undeformed):
+    """A load step after a state on other meshes."""
+
+    before: TransferredState
+
+    @property
+    def last(self) -> State | None:  # type: ignore[override]
+        return self.before.state
+
+    def check(self, scene: Scene) -> None:
+        self.before.check(scene)
+
+    def kept(self, scene: Scene) -> Scene:
+        return continued(scene, kept_by_joints(self.before.state))
+
+    def with_slip(self, torn: TornSystem) -> TornSystem:
+        scene = self.before.scene_on(torn.scene)
+        was = build_torn_system(scene, torn.decomposition, overlap=True, previous=torn)
+        return torn.with_slip_from(*self.before.slip_origin(with_points_inside(was, torn)))
+
+
+def after(before: State | TransferredState | None) -> Undeformed:
+    """Return what a load step goes on from."""
+    if before is None:
+        return Undeformed()
+    return AfterTransfer(before) if isinstance(before, TransferredState) else AfterState(before)
+
+
 @dataclass(frozen=True, eq=False)
 class Previous:
     """Earlier states.
 
-    `before`: at the end of the load step before, also on other meshes: slip is measured from there, and
-    histories go on; None: the undeformed bodies; `start`: whose multipliers come first, also on coarser
-    meshes; None: zero; `known`: of which parts may be reused; None: nothing.
+    `before`: at the end of the load step before: slip is measured from there, and histories go on; `start`:
+    whose multipliers come first; `known`: of which parts may be reused; None: nothing.
     """
 
-    before: State | TransferredState | None = None
-    start: State | CoarseStart | None = None
+    before: Undeformed
+    start: NoStart = field(default_factory=NoStart)
     known: State | None = None
 
     @property
     def last(self) -> State | None:
         """The state at the end of the load step before, on its meshes."""
-        return self.before.state if isinstance(self.before, TransferredState) else self.before
-
-    @property
-    def is_coarser(self) -> bool:
-        """Whether the start is on coarser meshes."""
-        return isinstance(self.start, CoarseStart)
-
-    def check(self, scene: Scene) -> None:
-        """Reject what cannot be carried to the meshes of a scene."""
-        if isinstance(self.before, TransferredState):
-            self.before.check(scene)
-
-    def kept(self, scene: Scene) -> Scene:
-        """Return a scene with what supports and joints keep from the load step before. Collective."""
-        last = self.last
-        if last is self.before:
-            scene = with_kept(scene, last)
-        return continued(scene, {} if last is None else kept_by_joints(last))
+        return self.before.last
 
     def starting(
         self, scene: Scene, first: State | None, refinements: Mapping[str, Refinement] | None
     ) -> Previous:
         """Return them with the start that a state gives, by default that of the load step before."""
-        own = self.last if self.last is self.before else None
-        return replace(self, start=checked_start(scene, first or own, refinements))
+        return replace(self, start=checked_start(scene, first or self.before.here, refinements))
 
     def reusing(self, scene: Scene, last: State | None) -> Previous:
         """Return them with what may be reused: the last state with the scene's meshes, else the start."""
-        known = None if isinstance(self.start, CoarseStart) else self.start
-        if known is not None and last is not None and scene.has_meshes_of(last.scene):
+        known = self.start.here
+        if known and last and scene.has_meshes_of(last.scene):
             known = last
         return replace(self, known=known)
-
-    def with_slip(self, torn: TornSystem) -> TornSystem:
-        """Return a system that measures slip from the load step before. Collective."""
-        return torn if self.before is None else torn.with_slip_from(*_slip_origin(self.before, torn))
-
-
-def _slip_origin(before: State | TransferredState, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
-    if isinstance(before, TransferredState):
-        scene = before.scene_on(torn.scene)
-        was = build_torn_system(scene, torn.decomposition, overlap=True, previous=torn)
-        return before.slip_origin(with_points_inside(was, torn))
-    if has_rows_of(before, torn):
-        own = before.torn
-        sticks = sticking(own, before.rows) if own.tangential_rows.size else False
-        return own.slip_origin(before.torn_displacement, before.solution.multiplier, sticks)
-    was, multiplier = on_rows_of(before, torn)
-    return was.slip_origin(before.torn_displacement, multiplier)

@@ -16,7 +16,7 @@ from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.linear import DirectEquilibria, LinearEquilibria, default_solver
 from fenics_contact._equilibrium.other_rows import continued
-from fenics_contact._equilibrium.previous import ONLY_STEP, Equilibria, Previous, Wanted
+from fenics_contact._equilibrium.previous import ONLY_STEP, Equilibria, Previous, Wanted, after
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._equilibrium.warnings import ContactWarnings
 from fenics_contact._scene.memory import Fit
@@ -247,13 +247,13 @@ class ContactProblem:
             >>> state = fine.solve(start=coarse, refinements={"block": finer})  # doctest: +SKIP
         """
         check_not_forked()
-        scene, previous = self.scene if scene is None else scene, Previous(before)
+        scene, previous = self.scene if scene is None else scene, Previous(after(before))
         with together(self.comm):
             accuracy = checked_tolerance(self.tolerance if tolerance is None else tolerance)
             wanted = Wanted(accuracy, step or ONLY_STEP, design)
             _require_obstacles_at(scene, wanted.time)
-            previous.check(scene)
-        scene = previous.kept(scene)
+            previous.before.check(scene)
+        scene = previous.before.kept(scene)
         equilibria = self._equilibria(scene, sensitivity=design or adjoint)
         _dolfinx.warn_if_untested(self.comm.rank)  # once PETSc has started on the ranks that solve
         first = self.state if start == "last" else start

@@ -26,7 +26,6 @@ from fenics_contact.qp.in_turn import InTurn
 from fenics_contact.qp.solution import DualSolution, continued
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.dual_solve import solve_dual
-from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
 
 _LOG = logging.getLogger(__name__)
@@ -34,20 +33,17 @@ _LOG = logging.getLogger(__name__)
 
 def known_system(state: State | None) -> DualSystem | None:
     """Return the dual system of a state, whose unchanged parts the next one reuses."""
-    system = state.system if isinstance(state, LinearState) else None
-    return system if isinstance(system, DualSystem) else None
+    return state.reusable if state else None
 
 
-def checked_start(
-    scene: Scene, start: State | None, refinements: Mapping[str, Refinement] | None
-) -> State | CoarseStart | None:
+def checked_start(scene: Scene, start: State | None, refinements: Mapping[str, Refinement] | None) -> NoStart:
     """Return what multipliers are guessed from: a state on the meshes of a scene, or on coarser ones."""
     if start is None:
         if refinements is not None:
             raise InvalidInputError(
                 "refinements need the state on the meshes that were refined, got none: give it by start="
             )
-        return None
+        return NoStart()
     if refinements is not None:
         coarse = CoarseStart(start, refinements)
         coarse.check(scene)
@@ -58,17 +54,30 @@ def checked_start(
             f"start must be a state on the meshes of the scene, of {cells[1]} cells and nodes, got "
             f"{cells[0]}: where they are refined give refinements=, else start=None"
         )
-    return start
+    return SameMeshes(start)
 
 
-def first_guess(start: State | CoarseStart | None, system: DualSystem) -> np.ndarray | None:
-    """Return the multipliers of an earlier state on the rows of a system, None without any. Collective."""
-    if isinstance(start, CoarseStart):
-        return start.multiplier(system)
-    old = known_system(start)
-    if start is None or old is None or not isinstance(start.solution, DualSolution):
+class NoStart:
+    """A solution that starts from nothing."""
+
+    is_coarser = False
+    #: The state on the meshes of the scene, of which parts may be reused.
+    here: State | None = None
+
+    def first_guess(self, system: DualSystem) -> np.ndarray | None:
+        """Return multipliers on the rows of a system, owned, None without any. Collective."""
         return None
-    return carried_over(old.torn, start.solution.multiplier, system.torn)
+
+
+@dataclass(frozen=True, eq=False)
+class SameMeshes(NoStart):
+    """A state on the meshes of the scene as start."""
+
+    here: State
+
+    def first_guess(self, system: DualSystem) -> np.ndarray | None:
+        old = self.here.reusable
+        return carried_over(old.torn, self.here.solution.multiplier, system.torn) if old else None
 
 
 def carried_over(before: TornSystem, multiplier: np.ndarray, after: TornSystem) -> np.ndarray:
@@ -165,7 +174,7 @@ def _put(torn: TornSystem, vector: np.ndarray, rows: np.ndarray, values: np.ndar
 
 
 @dataclass(frozen=True, eq=False)
-class CoarseStart:
+class CoarseStart(NoStart):
     """A state as start on meshes that were refined from its own, by nested iteration.
 
     Displacements u and tractions of contact are interpolated. The gluing forces follow from those, by the
@@ -186,6 +195,8 @@ class CoarseStart:
     state: State
     refinements: Mapping[str, Refinement | MeshTransfer]
 
+    is_coarser = True
+
     def fits(self, scene: Scene) -> bool:
         """Return whether the refinements may lead to the meshes of a scene."""
         coarse = self.state.scene
@@ -203,7 +214,7 @@ class CoarseStart:
                 "meshes before"
             )
 
-    def multiplier(self, system: DualSystem) -> np.ndarray:
+    def first_guess(self, system: DualSystem) -> np.ndarray:
         """Return the first guess on the rows of a system, owned; about one product. Collective."""
         torn, problem = system.torn, system.problem
         moved, start = self.displacement(torn), self.at_contact(torn)

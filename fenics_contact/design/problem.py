@@ -30,7 +30,7 @@ from fenics_contact.design.objective import (
     finite_value,
     guarded_user_call,
 )
-from fenics_contact.design.sensitivity import adjoint_of, by_nodes, products_of
+from fenics_contact.design.sensitivity import adjoint_of, by_nodes
 from fenics_contact.errors import (
     ConvergenceError,
     InfeasibleError,
@@ -341,7 +341,7 @@ class ShapeProblem(SingleProblem):
         scene = self.scene_of(alpha)
         state = design_state(self.contact, scene, coarse, self._tightest, refinements=refinements)
         self._memory.record_state(alpha, state)
-        self._memory.products += products_of(state)
+        self._memory.products += state.products
         return state
 
     @collectively("ShapeProblem.on", lambda self, contact, *_: contact.comm)
@@ -461,7 +461,7 @@ class ShapeProblem(SingleProblem):
             scene = self.scene_of(alpha) if known is None else known.state.scene
         state = design_state(self.contact, scene, previous, tolerance, before=after)
         self._memory.record_state(alpha, state)
-        self._memory.products += products_of(state)
+        self._memory.products += state.products
         return state
 
     def _point_at(
@@ -473,7 +473,7 @@ class ShapeProblem(SingleProblem):
         partials: Partials | None = None,
     ) -> DesignPoint:
         """Return objective, subgradient and their errors at a state. Collective."""
-        before = products_of(state)
+        before = state.products
         if partials is None:
             partials = self.partials_of(self.objective, state)
         with one_thread(self.comm), self._timer.phase("adjoint"):
@@ -484,7 +484,7 @@ class ShapeProblem(SingleProblem):
         with one_thread(self.comm), self._timer.phase("gradient"):
             by_points = by_nodes(state, adjoint, partials, linearised, self.geometry.forms)
             gradient = self.geometry.pull_back(by_points)
-        spent = max(products_of(state) - before, adjoint.iterations)
+        spent = max(state.products - before, adjoint.iterations)
         self._memory.products += spent
         value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions, whatever the rounding in sums over ranks.
@@ -528,5 +528,5 @@ class ShapeProblem(SingleProblem):
 
     def _restored(self, alpha: np.ndarray, stored: Stored) -> AnyState:
         state = self.contact.restore(stored, self.scene_of(alpha))
-        self._memory.products += products_of(state)
+        self._memory.products += state.products
         return state

@@ -38,7 +38,7 @@ from fenics_contact.feti.averages import nodal_mean_at, nodal_mean_transposed
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.krylov import Stop
 from fenics_contact.results.deformed_state import DeformedState
-from fenics_contact.results.linear_state import LinearState, as_linear
+from fenics_contact.results.linear_state import as_linear
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
@@ -166,11 +166,6 @@ def _on_surfaces(torn: TornSystem, points: SlidingPoints, field: np.ndarray) -> 
     values = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
     values[nodes] = nodal_mean_at(torn.decomposition, field, nodes)
     return values.ravel()
-
-
-def products_of(state: State) -> int:
-    """Return the number of F-products of a state so far; those of a deformed state's adjoint do not count."""
-    return state.system.products if isinstance(state, LinearState) else state.solution.products
 
 
 def adjoint_of(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,20 +34,19 @@ class LinearState(State):
     """The equilibrium of linear materials and small strains.
 
     Attributes:
-        system: The system that was solved: a dual one, or that of a single body that needs none.
+        system: The dual system that was solved.
 
     Example:
         >>> print(state.estimate_errors())  # doctest: +SKIP
     """
 
-    solution: DualSolution | DirectSolution
-    system: DualSystem | DirectSystem
+    solution: DualSolution
+    system: DualSystem
 
     @property
     def counts(self) -> dict[str, int]:
         """Those of every state, and the ``kinds`` of subdomains whose factors those alike share, by rank."""
-        kinds = {} if isinstance(self.system, DirectSystem) else {"kinds": self.system.kinds}
-        return {**super().counts, **kinds}
+        return {**super().counts, "kinds": self.system.kinds}
 
     def _errors_in_words(self) -> dict[str, str]:
         if self.known_errors is None:
@@ -61,21 +60,22 @@ class LinearState(State):
         Raises:
             InvalidInputError: If the state was computed without one.
         """
-        self._require_multipliers()
-        return cast(DualSystem, self.system)
+        return self.system
 
     @property
     def dual_solution(self) -> DualSolution:
         """The result of the dual solver; raises as `dual` does."""
-        self._require_multipliers()
-        return cast(DualSolution, self.solution)
+        return self.solution
 
-    def _require_multipliers(self) -> None:
-        if isinstance(self.system, DirectSystem):
-            raise InvalidInputError(
-                "this needs multipliers, but the state of one body that supports hold was solved directly: "
-                "solve with design=True"
-            )
+    @property
+    def reusable(self) -> DualSystem | None:
+        """The dual system."""
+        return self.system
+
+    @property
+    def products(self) -> int:
+        """Products with F so far."""
+        return self.system.products
 
     @cached_property
     def rows(self) -> RowValues:
@@ -106,15 +106,13 @@ class LinearState(State):
                 estimate = discretisation_error(self.torn, self.conforming_displacement)
                 errors = state_errors(solver, estimate, self.energies.norm)
             if geometry and np.isnan(errors.geometry):
-                errors = errors.with_geometry(*_geometry_error(self.system, self.solution))
+                errors = errors.with_geometry(*self._geometry_error())
         object.__setattr__(self, "known_errors", errors)
         return errors
 
     @cached_property
     def unheld(self) -> tuple[UnheldMotion, ...]:
         """See `State.unheld`. Collective on first use."""
-        if not isinstance(self.system, DualSystem) or not isinstance(self.solution, DualSolution):
-            return ()
         return unheld_motions(self.system) + idle_motions(self.system, self.solution)
 
     @cached_property
@@ -123,9 +121,80 @@ class LinearState(State):
         """See `State.conforming_displacement`; without iteration. Collective on first use."""
         return self.system.conforming(self.torn_displacement)
 
+    def _geometry_error(self) -> tuple[float, float]:
+        """Estimate the distance to the state of the true surfaces on the same mesh. Collective.
+
+        The contact problem is solved once more with the gaps between surfaces that are known better: the
+        shapes that the meshes carry, where facets or reconstructed surfaces were used; where there are none,
+        reconstructed surfaces of the next order. Factors, coarse problem and preconditioner are those of the
+        system. It is not a bound: the error of the facets' normals is left out, which matters where their
+        gaps happen to be right, as between mirrored bodies by mortar. Returns distance in energy norm,
+        [√(force · length)], and change of the largest contact pressure, relative to that of the better
+        geometry; zeros where shapes are known and used, and between flat surfaces.
+        """
+        torn, system = self.torn, self.system
+        if not torn.points.count:
+            return 0.0, 0.0
+        gap = torn.finer_gap()
+        if np.array_equal(gap, torn.points.gap):
+            return 0.0, 0.0
+        solver = FaceNewton(tolerance=GEOMETRY_TOLERANCE)
+        present = solve_dual(system, solver, self.solution)
+        finer = DualSystem(torn.with_gap(gap), previous=system)
+        better = solve_dual(finer, solver, present)
+        way = better.multiplier - present.multiplier
+        square = float(finer.problem.comm.allreduce(way @ finer.apply(way)))
+        peaks = [_peak(system, present), _peak(finer, better)]
+        by_geometry = abs(peaks[0] - peaks[1]) / peaks[1] if peaks[1] > 0.0 else 0.0
+        return float(np.sqrt(max(square, 0.0))), by_geometry
+
     @cached_property
     def _least_force(self) -> float:
         return _rounding_force(self.torn, self.torn_displacement)
+
+
+@displayed
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DirectState(LinearState):
+    """The state of one body that supports hold, whose stiffness was factored: there are no multipliers."""
+
+    solution: DirectSolution  # type: ignore[assignment]
+    system: DirectSystem  # type: ignore[assignment]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Those of every state."""
+        return super(LinearState, self).counts
+
+    @property
+    def dual(self) -> DualSystem:
+        """None; raises `InvalidInputError`."""
+        raise _no_multipliers()
+
+    @property
+    def dual_solution(self) -> DualSolution:
+        """None; raises `InvalidInputError`."""
+        raise _no_multipliers()
+
+    @property
+    def reusable(self) -> DualSystem | None:
+        """None."""
+        return None
+
+    @cached_property
+    def unheld(self) -> tuple[UnheldMotion, ...]:
+        """None: supports hold the body."""
+        return ()
+
+    def _geometry_error(self) -> tuple[float, float]:
+        return 0.0, 0.0
+
+
+def _no_multipliers() -> InvalidInputError:
+    return InvalidInputError(
+        "this needs multipliers, but the state of one body that supports hold was solved directly: solve "
+        "with design=True"
+    )
 
 
 def as_linear(state: State, what: str) -> LinearState:
@@ -141,36 +210,6 @@ def as_linear(state: State, what: str) -> LinearState:
 #: Relative residual of the state of the better geometry: differences between states are a few percent of them
 #: or not worth reporting.
 GEOMETRY_TOLERANCE = 1e-6
-
-
-def _geometry_error(
-    system: DualSystem | DirectSystem, solution: DualSolution | DirectSolution
-) -> tuple[float, float]:
-    """Estimate the distance to the state of the true surfaces on the same mesh. Collective.
-
-    The contact problem is solved once more with the gaps between surfaces that are known better: the shapes
-    that the meshes carry, where facets or reconstructed surfaces were used; where there are none,
-    reconstructed surfaces of the next order. Factors, coarse problem and preconditioner are those of the
-    system. It is not a bound: the error of the facets' normals is left out, which matters where their gaps
-    happen to be right, as between mirrored bodies by mortar. Returns distance in energy norm, [√(force ·
-    length)], and change of the largest contact pressure, relative to that of the better geometry; zeros where
-    shapes are known and used, and between flat surfaces.
-    """
-    torn = system.torn
-    if not isinstance(system, DualSystem) or not isinstance(solution, DualSolution) or not torn.points.count:
-        return 0.0, 0.0
-    gap = torn.finer_gap()
-    if np.array_equal(gap, torn.points.gap):
-        return 0.0, 0.0
-    solver = FaceNewton(tolerance=GEOMETRY_TOLERANCE)
-    present = solve_dual(system, solver, solution)
-    finer = DualSystem(torn.with_gap(gap), previous=system)
-    better = solve_dual(finer, solver, present)
-    way = better.multiplier - present.multiplier
-    square = float(finer.problem.comm.allreduce(way @ finer.apply(way)))
-    peaks = [_peak(system, present), _peak(finer, better)]
-    by_geometry = abs(peaks[0] - peaks[1]) / peaks[1] if peaks[1] > 0.0 else 0.0
-    return float(np.sqrt(max(square, 0.0))), by_geometry
 
 
 def _peak(system: DualSystem, solution: DualSolution) -> float:

@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     import pyvista
 
     from fenics_contact._accuracy.state_errors import BalancedTolerance, StateErrors
+    from fenics_contact.feti.dual import DualSystem
 
 
 @dataclass(frozen=True)
@@ -627,6 +628,16 @@ class State(ABC):
             >>> sum(comm.allgather(state.costs.total.message_bytes))  # of all ranks  # doctest: +SKIP
         """
         return costs_of(self.torn.decomposition.comm)
+
+    @property
+    def reusable(self) -> DualSystem | None:
+        """The dual system, whose unchanged parts the next one reuses; None where there is none."""
+        return None
+
+    @property
+    def products(self) -> int:
+        """Products with F so far; those of a deformed state's adjoint do not count."""
+        return self.solution.products
 
     @property
     def counts(self) -> dict[str, int]:

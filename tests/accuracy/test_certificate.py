@@ -29,12 +29,12 @@ from fenics_contact._accuracy import certificate
 from fenics_contact._accuracy.certificate import Certificate, certify, direct_error
 from fenics_contact._accuracy.discretisation import discretisation_error
 from fenics_contact._accuracy.state_errors import friction_error, solver_errors, state_errors
-from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual
+from fenics_contact.results.linear_state import DirectState
 from tests import scenes
 from tests.accuracy.algebraic import CASES, Measured, clamped, energy_norm, measured, solved
 
@@ -147,8 +147,8 @@ def test_the_error_of_a_factorisation_is_that_of_its_residual() -> None:
     scene = clamped()
     whole = {"block": np.zeros(scene.bodies["block"].mesh.n_cells, dtype=int)}
     state = solve_scene(scene, MPI.COMM_SELF, partitions=whole)
+    assert isinstance(state, DirectState)
     system, solution = state.system, state.solution
-    assert isinstance(system, DirectSystem)
     norm = energy_norm(state, solution.displacement)
     assert direct_error(system, solution) < 1e-12 * norm
     free = np.setdiff1d(np.arange(len(solution.displacement)), state.torn.B.indices)

@@ -27,7 +27,7 @@ def residuals(state: AnyState) -> dict[str, float]:
     """
     problem, multiplier = state.system.problem, state.solution.multiplier
     G, layout, bound = problem.coarse.matrix, problem.layout, slip_bound(state)
-    r = state.system.apply(multiplier) - problem.rhs - G.T @ state.solution.alpha
+    r = state.system.apply(multiplier) - problem.rhs - G.T @ state.dual_solution.alpha
     forces = np.abs(G) @ np.abs(multiplier) + np.abs(problem.coarse.load)
     size = np.linalg.norm(multiplier[layout.normal]) or 1.0
     normal, tau = multiplier[layout.normal], multiplier[layout.tangential]

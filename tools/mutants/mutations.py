@@ -239,8 +239,8 @@ MUTATIONS = (
     Mutation(
         "load steps forget the slip before",
         "_equilibrium/previous.py",
-        "return torn if self.before is None else",
-        "return torn if self.before is not None else",
+        "return torn.with_slip_from(*was.slip_origin(before.torn_displacement, multiplier, sticks))",
+        "return torn",
         ("tests/equilibrium/test_steps.py::test_unloading_does_not_return_to_the_start",),
     ),
     Mutation(
