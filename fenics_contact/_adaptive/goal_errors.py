@@ -299,10 +299,8 @@ def _require_reached(
     sums = [comm.allreduce(float(np.abs(x).sum())) for x in slopes]
     if max(map(abs, found)) <= least * float(np.dot(largest, sums)):
         raise InvalidInputError(
-            f"a quantity needs loads that reach it, but {objective!r} is zero on this mesh: "
-            "it is measured where supports hold the body, where no load is transmitted, or along a direction "
-            "in which nothing acts; choose another place or direction, or a finer mesh if surfaces touch on "
-            "that one"
+            f"a quantity needs loads that reach it, but {objective!r} is zero on this mesh: choose another "
+            "place or direction, or a finer mesh if surfaces touch on that one"
         )
 
 

@@ -63,9 +63,8 @@ class TransferredState:
         """
         if not self.fields.fits(scene):
             raise InvalidInputError(
-                "transfers of a TransferredState must lead from the meshes of its state to those of the "
-                f"scene, got others, of {sorted(self.transfers)}: give the refinements with which both were "
-                "made"
+                "transfers must lead from the meshes of the state to those of the scene, got others, of "
+                f"{sorted(self.transfers)}: give the refinements with which both were made"
             )
         others = {
             "contact of bodies that deform much": bool(scene.contacts) and scene.deforms_much,

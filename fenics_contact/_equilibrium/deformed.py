@@ -253,9 +253,8 @@ class DeformedEquilibria:
         ]
         if new := sorted(places[1] - places[0]):
             raise InvalidInputError(
-                f"a RigidSurface of a scene with nonlinear materials must be there from the first step on, "
-                f"that on surface {new[0][1]!r} of body {new[0][0]!r} is new: give it in the steps before, "
-                "too, with all components free"
+                f"a RigidSurface must be there from the first step on, that on surface {new[0][1]!r} of body "
+                f"{new[0][0]!r} is new: give it in the steps before, too, with all components free"
             )
         pairs = [[(pair.slave, pair.master) for pair in each.contacts] for each in (before.scene, scene)]
         if scene.deforms_much and any(one != other for one, other in zip(*pairs, strict=False)):
@@ -402,9 +401,8 @@ def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
     alone = unresisted_motions(torn, sprung=False) if torn.scene.foundations else ()
     if alone:
         raise InfeasibleError(
-            "Newton's method needs supports, ties or contacts that resist every motion beside elastic "
-            f"foundations, but nothing else resists body {alone[0]}: support it there (a symmetric part on "
-            "its planes of symmetry), or cut the body into fewer subdomains"
+            f"elastic foundations alone hold body {alone[0]}, but Newton's method needs supports, ties or "
+            "contacts beside them: support it there, or cut the body into fewer subdomains"
         ) from failure
 
 

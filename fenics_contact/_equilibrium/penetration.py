@@ -89,8 +89,7 @@ class FluidFront:
         if torn.free.count:
             raise InvalidInputError(
                 "derivatives by the shape with fluid that enters a contact need rigid tools and surfaces "
-                "whose whole motion is prescribed, and preloads by a shortening: prescribe the motion, "
-                "or load the wetted surfaces by Pressure"
+                "and preloads whose motion is known: prescribe it, or load the wetted surfaces by Pressure"
             )
 
     def pass_tolerance(self, wanted: float) -> float:
@@ -118,10 +117,10 @@ class FluidFront:
             if np.array_equal(following, wet):
                 return passes.answer(state)
             wet = following
+        after, there = counted(passes.count, "pass", "passes"), counted(int(wet.sum()), "wet point")
         raise ConvergenceError(
-            f"the front of a fluid must come to rest, but after {counted(passes.count, 'pass', 'passes')} it "
-            f"returns to {counted(int(wet.sum()), 'wet point')} where it was before: apply pressure and load "
-            "in smaller load steps, refine the contact, or give the fluid a critical pressure",
+            f"the front of a fluid must come to rest, but after {after} it returns to {there} where it was "
+            "before: take smaller load steps, refine the contact, or give the fluid a critical pressure",
             passes.history,
         )
 

@@ -387,6 +387,5 @@ def _require_obstacles_at(scene: Scene, time: float) -> None:
         if isinstance(pair.master, MovingObstacle) and not pair.master.is_where_it_was(time):
             raise InvalidInputError(
                 f"with small displacements obstacles must not move, but that of {pair.place} has moved by "
-                f"time {time:g}: move the bodies against it by their supports, or give a body a material for "
-                "large deformations"
+                f"time {time:g}: move the bodies against it, or give one a material for large deformations"
             )

@@ -85,12 +85,10 @@ class FrictionBySlip:
                 part *= -float(last @ turn) / (float(turn @ turn) or 1.0)
                 part = part if part > 0.0 else 1.0
             mu, last = np.maximum(mu + part * (target - mu), 0.0), missing
+        after = counted(passes.count, "pass", "passes")
         raise ConvergenceError(
-            "friction coefficients must agree with the slips, but after "
-            f"{counted(passes.count, 'pass', 'passes')} "
-            f"slip bounds still change by {change:.1e} of the largest: friction that falls with the slip "
-            "faster than bodies are stiff has several states or none, as in stick-slip; take smaller load "
-            "steps, drive the bodies by displacements, or let the coefficient fall over a longer slip",
+            f"friction coefficients must agree with the slips, after {after} slip bounds still change by "
+            f"{change:.1e}, as in stick-slip; take smaller load steps, or drive the bodies",
             passes.history,
         )
 

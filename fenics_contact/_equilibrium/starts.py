@@ -210,8 +210,7 @@ class CoarseStart(NoStart):
         if not self.fits(scene):
             raise InvalidInputError(
                 "refinements must lead from the meshes of start to those of the scene, got others, of "
-                f"{sorted(self.refinements)}: give those with which the scene was made, and the state on the "
-                "meshes before"
+                f"{sorted(self.refinements)}: give those with which the scene was made"
             )
 
     def first_guess(self, system: DualSystem) -> np.ndarray:

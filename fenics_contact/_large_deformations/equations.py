@@ -204,9 +204,8 @@ class ResidualState:
             bad = {s.mesh.body for s, response in parts if not np.isfinite(response.stiffness.data).all()}
             if bad:
                 raise ConvergenceError(
-                    f"tangents must be finite, got NaN or infinity in body {min(bad)!r} at a smallest "
-                    f"det F of {self.least_jacobian:.2g}: take smaller load steps, or check where the "
-                    "energy or stress of its material has a derivative"
+                    f"tangents must be finite, got NaN or infinity in body {min(bad)!r} at a smallest det F "
+                    f"of {self.least_jacobian:.2g}: take smaller load steps, or check its energy or stress"
                 )
 
     def linearised(

@@ -202,9 +202,9 @@ class TurnedSurface:
         own = np.abs(np.diag(found[1])) / units
         if own.min(initial=np.inf) <= np.sqrt(LAST_PLACES) * size.max(initial=0.0):
             raise ConvergenceError(
-                "rotations that are free about several axes must stay below a full turn, but the motion of "
-                f"surface {self.surface.surface!r} of body {self.surface.body!r} is {self.motion.tolist()}: "
-                "prescribe all but one, or take smaller load steps"
+                "rotations that are free about several axes must stay below a full turn, got "
+                f"{self.motion.tolist()} on {self.surface.surface!r}: prescribe all but one, or take smaller "
+                "steps"
             )
         return found[0], found[1]
 

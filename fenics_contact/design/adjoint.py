@@ -374,9 +374,8 @@ def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:
     work, size = system.problem.comm.allreduce(np.stack([work, size]))
     if np.any(np.abs(work) > MOTION_ROUNDING * size):
         raise ConvergenceError(
-            "the adjoint needs an objective that is the same wherever nothing holds a body, but this one "
-            "changes along a rigid motion that meets no resistance (`State.unheld`): add a support, or use "
-            "stresses, energies or contact forces"
+            "the adjoint needs an objective that no free motion changes, this one changes along a rigid "
+            "motion that meets no resistance (`State.unheld`): add a support, or take another"
         )
 
 

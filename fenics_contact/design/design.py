@@ -287,9 +287,8 @@ class MovedSurface:
         whole = grid.shape == self.design.lattice.parameters.shape
         if not rising or not whole or not np.allclose(grid, self.parameters, rtol=0.0, atol=1e-9):
             raise InvalidInputError(
-                f"the nodes of a design on {self.design.body!r} must form a grid in its parameters, "
-                f"{counts} nodes with rising parameters, got others: list them with s running slowest, of a "
-                "refined mesh take the problem on the first one"
+                f"the nodes of a design on {self.design.body!r} must form a grid in its parameters, {counts} "
+                "that rise, s slowest, got others: of a refined mesh take the problem on the first one"
             )
 
     def _facts(self) -> dict[str, Any]:

@@ -85,8 +85,7 @@ def finite(name: str, numbers: np.ndarray) -> np.ndarray:
     if bad.size:
         raise InvalidInputError(
             f"an objective must have a finite {name}, got {np.ravel(numbers)[bad[0]]} in entry {bad[0]}: "
-            "check divisions, roots and logarithms of what may be zero, or raise InvalidDesignError for a "
-            "design that has no value"
+            "check divisions, roots and logarithms, or raise InvalidDesignError where it has none"
         )
     return numbers
 

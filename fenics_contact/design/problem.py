@@ -153,8 +153,7 @@ def require_influence(
         return  # not known
     raise InvalidInputError(
         f"an objective must change with the design, but {objective!r} is {point.value:.6g} and none of "
-        f"{number} variables changes it: choose one that the moving surfaces affect (pressures "
-        "need a pair in contact, movements a body that they load), or start from another design"
+        f"{number} variables changes it: choose one that moving surfaces affect, or start elsewhere"
     )
 
 

@@ -97,9 +97,9 @@ def _way_between(body: str, name: str, before: BodyMesh, after: BodyMesh, nodes:
     hit = project(new.points[mine], -new.normals[mine], old)  # surfaces meet that face each other
     if len(hit.point) < len(nodes):
         raise InvalidInputError(
-            f"a new mesh of {body!r} must keep the place of surface {name!r}, as its pair gives the gap, but "
-            f"{len(nodes) - len(hit.point)} of {len(nodes)} new nodes do not face the surface before: keep "
-            "the nodes on its rim, or all facets, as mesh_io.refilled does"
+            f"a new mesh of {body!r} must keep {name!r}, whose gap is given, but "
+            f"{len(nodes) - len(hit.point)} of {len(nodes)} nodes do not face the one before: keep its rim, "
+            "or all facets"
         )
     weights, _ = shape_functions(hit.local, old.corners)
     moved = (before.points - before.origin.points)[old.nodes]
@@ -285,9 +285,9 @@ class Remeshed(SingleProblem):
         while (reach := self._reach(k, alpha)) < 1.0:
             if len(self.remeshings) == self.most or reach < 0.01:
                 raise InvalidDesignError(
-                    f"the design is out of reach of {len(self.problems)} meshes: the next one would allow "
-                    f"{reach:.1%} of the rest of the way (at most {self.most} are made): bound the "
-                    "design, allow more or give another mesher"
+                    f"the design is out of reach of {len(self.problems)} meshes: the next one allows "
+                    f"{reach:.1%} of the rest (at most {self.most} are made): allow more, or give another "
+                    "mesher"
                 )
             k = self._remesh(k, self.origins[k] + reach * (alpha - self.origins[k]))
         return k

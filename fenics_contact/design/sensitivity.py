@@ -117,9 +117,8 @@ def _require_differentiable(state: DeformedState) -> None:
         return
     if state.since > 0.0:
         raise InvalidInputError(
-            "derivatives of nonlinear scenes with friction need slip that is one step from the start of the "
-            f"load step, here it begins at {state.since:.3g} of it: leave out finer_history=True, or "
-            "prescribe less where bodies snap"
+            "derivatives with friction need slip that is one step from the start of the load step, here it "
+            f"begins at {state.since:.3g} of it: leave out finer_history=True, or prescribe less"
         )
     if isinstance(contact, MovedContact) and state.begun is None:
         raise InvalidInputError(

@@ -447,8 +447,7 @@ def _checked(
         if not isinstance(objectives, Mapping):
             raise InvalidInputError(
                 "LoadPath.objectives must map names of steps to objectives, got "
-                f"{type(objectives).__name__}: give {{'{names[-1]}': objective}}, or none for that of the "
-                "problem in all steps"
+                f"{type(objectives).__name__}: give {{'{names[-1]}': objective}}, or none"
             )
         if not objectives or not set(objectives) <= set(names):
             raise InvalidInputError(

@@ -200,8 +200,7 @@ class Resultant:
         if len(self.force) == 2:
             raise InvalidInputError(
                 "an axis needs bodies in space, these are plane: their only axis is normal to the plane, "
-                "and moment_about(point) is the torque about it; of bodies of revolution with torsion moment "
-                "is that about their axis"
+                "moment_about(point) is the torque about it, with torsion moment that about their axis"
             )
         return float(np.dot(self.moment_about(point), unit_vector("the direction of an axis", direction, 3)))
 
