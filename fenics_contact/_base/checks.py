@@ -69,6 +69,13 @@ def check_row(values: Any, name: str, count: int) -> None:
         )
 
 
+def check_each(fits: np.ndarray, needed: str, remedy: str, named: Callable[[int], str]) -> None:
+    """Reject what is not all as needed; `named` describes one by its number."""
+    if not fits.all():
+        few, first = f"{np.count_nonzero(~fits)} of {len(fits)}", named(int(np.argmin(fits)))
+        raise InvalidInputError(f"{needed}, {few} do not, first {first}: {remedy}")
+
+
 def brief(value: Any) -> str:
     """Return a value for messages, also an integer that Python refuses to convert to text."""
     if isinstance(value, int) and value.bit_length() > 100:

@@ -244,7 +244,7 @@ def target_parts(mesh: BodyMesh, nodes: float | None = None) -> int:
     nodes = TARGET_NODES[mesh.dim] if nodes is None else nodes
     if not 2**mesh.dim <= nodes < np.inf:
         raise InvalidInputError(
-            f"nodes must be at least {2**mesh.dim}, which one cell has, got {nodes}: a few hundred are usual"
+            f"nodes must be at least {2**mesh.dim}, which one cell has, got {nodes}: try 500"
         )
     inside = (nodes ** (1.0 / mesh.dim) - 1.0) ** mesh.dim
     whole = mesh.n_nodes if mesh.has_several_shapes else mesh.n_cells * _NODES_PER_CELL[mesh.cell_type]

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from fenics_contact._base.checks import LARGEST, brief
+from fenics_contact._base.checks import LARGEST, brief, check_each
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import quality
@@ -59,21 +59,16 @@ def checked_points(points: ArrayLike, shape: tuple[int, ...] | None = None) -> n
     try:
         array = np.array(points, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidInputError(
-            f"points must be numbers, got {brief(points)} ({error}): give an array of coordinates"
-        ) from error
+        raise InvalidInputError(f"points must be numbers, got {brief(points)} ({error})") from error
     if array.ndim != 2 or array.shape[1] not in (2, 3) or (shape is not None and array.shape != shape):
         needed = "(n_nodes, 3) or (n_nodes, 2)" if shape is None else str(shape)
-        raise InvalidInputError(
-            f"points must have shape {needed}, got {array.shape}: give all coordinates of every node, three "
-            "for a solid, two for a plane body"
-        )
-    bad = np.flatnonzero(~(np.abs(array) < LARGEST).all(axis=1))
-    if bad.size:
-        raise InvalidInputError(
-            f"points must be finite and below {LARGEST:g}, {bad.size} of {array.shape[0]} are not, first "
-            f"node {bad[0]} at {array[bad[0]].tolist()}: a NaN comes from whatever computed these coordinates"
-        )
+        raise InvalidInputError(f"points must have shape {needed}, got {array.shape}: give one row per node")
+    check_each(
+        (np.abs(array) < LARGEST).all(axis=1),
+        f"points must have finite coordinates below {LARGEST:g}",
+        "see what computed them",
+        lambda node: f"node {node} at {array[node].tolist()}",
+    )
     array.setflags(write=False)
     return array
 
@@ -86,12 +81,8 @@ def checked_cells(cells: ArrayLike, n_nodes: int, dim: int) -> np.ndarray:
         raise InvalidInputError("a mesh must have at least one cell, got none: give the cells of the body")
     check_range(array, n_nodes, "cells")
     check_collapsed(array, dim)
-    orphans = np.flatnonzero(np.bincount(array.ravel(), minlength=n_nodes) == 0)
-    if orphans.size:
-        raise InvalidInputError(
-            f"every node must belong to a cell, {orphans.size} of {n_nodes} do not, first node {orphans[0]}: "
-            "remove them and renumber (nothing would hold them)"
-        )
+    used = np.bincount(array.ravel(), minlength=n_nodes) > 0
+    check_each(used, "every node must belong to a cell", "remove them and renumber", "node {}".format)
     return array
 
 
@@ -115,9 +106,8 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str, given: b
     worst = int(np.argmin(ratios))
     centre = ", ".join(f"{x:.6g}" for x in points[cells[inverted[worst]]].mean(axis=0))
     raise InvalidInputError(
-        f"every cell must have a positive Jacobian, {inverted.size} of {cells.shape[0]} are inverted or "
-        f"flat; the worst is cell {inverted[worst]} at ({centre}) with a "
-        f"Jacobian ratio (smallest over largest) of {ratios[worst]:.3g}: {remedy}"
+        f"every cell must have a positive Jacobian, {inverted.size} of {len(cells)} are inverted or flat; "
+        f"the worst is cell {inverted[worst]} at ({centre}), of Jacobian ratio {ratios[worst]:.3g}: {remedy}"
     )
 
 
@@ -138,9 +128,8 @@ def _check_resolved(points: np.ndarray, thick: np.ndarray) -> None:
     coarse = np.count_nonzero(thick < RESOLVED * rounding)
     if coarse:
         raise InvalidInputError(
-            f"coordinates must resolve the cells, but up to {np.abs(points).max():.3g} from the origin they "
-            f"are rounded by {rounding:.1e}, and {coarse} of {len(thick)} cells are as thin as "
-            f"{thick.min():.1e}: move all bodies nearer to the origin"
+            f"coordinates must resolve the cells, but are rounded by {rounding:.1e}, and {coarse} of "
+            f"{len(thick)} cells are as thin as {thick.min():.1e}: move all bodies nearer to the origin"
         )
 
 
@@ -151,8 +140,7 @@ def checked_grid(grid: ArrayLike | None, n_cells: int, dim: int) -> np.ndarray |
     array = integers(grid, "grid")
     if array.shape != (n_cells, dim) or array.min() < 0:
         raise InvalidInputError(
-            f"grid must have shape ({n_cells}, {dim}) and no negative entry, got shape {array.shape}: give "
-            f"{dim} indices for every cell, or None for an unstructured mesh"
+            f"grid must have shape ({n_cells}, {dim}) without negative entries, or be None, got {array.shape}"
         )
     return array
 
@@ -164,26 +152,23 @@ def checked_regions(regions: Mapping[str, ArrayLike], n_cells: int) -> dict[str,
     for number, (name, cells) in enumerate(regions.items()):
         array = np.sort(integers(cells, f"region '{name}'"), axis=None)
         if array.size == 0 or array[0] < 0 or array[-1] >= n_cells:
+            given = f"{array[0]} to {array[-1]}" if array.size else "none"
             raise InvalidInputError(
-                f"region '{name}' must hold cell numbers from 0 to {n_cells - 1}, got "
-                f"{f'{array[0]} to {array[-1]}' if array.size else 'none'}: cell numbers count the rows of "
-                "cells from zero; leave out a region that is empty"
+                f"region '{name}' must hold cell numbers from 0 to {n_cells - 1}, got {given}: omit it if "
+                "empty"
             )
         taken = np.union1d(array[owner[array] >= 0], array[1:][np.diff(array) == 0])
         if taken.size:
             raise InvalidInputError(
-                f"every cell must belong to one region, {taken.size} of region '{name}' are in it twice or "
-                f"in another too, first cell {taken[0]}: give each cell to one region"
+                f"a cell is in one region, {taken.size} of '{name}' in it twice or in others, first "
+                f"{taken[0]}"
             )
         owner[array] = number
         array.setflags(write=False)
         checked[name] = array
-    left = np.flatnonzero(owner < 0)
-    if checked and left.size:
-        raise InvalidInputError(
-            f"every cell must belong to a region where there are any, {left.size} of {n_cells} do not, first "
-            f"cell {left[0]}: give the rest a region of its own"
-        )
+    if checked:
+        needed = "every cell must belong to a region where there are any"
+        check_each(owner >= 0, needed, "give the rest a region of its own", "cell {}".format)
     return checked
 
 
@@ -200,8 +185,7 @@ def checked_node_sets(
         if array.size == 0 or array.ndim != 1 or len(checked[name]) < len(array) or name in surfaces:
             given = "the name of a surface" if name in surfaces else f"an array of shape {array.shape}"
             raise InvalidInputError(
-                f"node set '{name}' must hold one or more node numbers, each once, and have a name of its "
-                f"own, got {given}: leave out a set that is empty, or rename it"
+                f"node set '{name}' must hold one or more nodes once and have its own name, got {given}"
             )
     return checked
 
@@ -214,23 +198,21 @@ def check_hanging(hanging: HangingNodes, points: np.ndarray, n_cells: int) -> No
     shape = (len(nodes), 2 ** (points.shape[1] - 1))
     if masters.shape != shape or levels.shape != (n_cells,) or np.any(np.diff(nodes) <= 0):
         raise InvalidInputError(
-            f"hanging must have nodes in ascending order, masters of shape {shape} and a level for each of "
-            f"{n_cells} cells, got {len(nodes)} nodes, masters {masters.shape} and levels {levels.shape}: "
-            "let mesh.refined make them"
+            f"hanging must have ascending nodes, masters of shape {shape} and {n_cells} levels, got masters "
+            f"{masters.shape} and levels {levels.shape} or nodes in another order: let mesh.refined make them"
         )
     every = np.concatenate([nodes, masters.ravel()])
     if every.min() < 0 or every.max() >= len(points) or np.isin(masters, nodes).any():
         raise InvalidInputError(
-            f"masters of hanging nodes must be nodes 0 to {len(points) - 1} that do not hang, got others: "
-            "let mesh.refined make them"
+            "masters of hanging nodes must be nodes of the mesh that do not hang: let mesh.refined make them"
         )
     away = np.abs(points[nodes] - points[masters].mean(axis=1)).max(axis=1)
-    off = np.flatnonzero(away > 2 * coordinate_rounding(points))
-    if off.size:
-        raise InvalidInputError(
-            f"hanging nodes must lie at the mean of their masters, {off.size} of {len(nodes)} do not, first "
-            f"node {nodes[off[0]]} by {away[off[0]]:.3g}: let mesh.refined place them"
-        )
+    check_each(
+        away <= 2 * coordinate_rounding(points),
+        "hanging nodes must lie at the mean of their masters",
+        "let mesh.refined place them",
+        lambda k: f"node {nodes[k]} by {away[k]:.3g}",
+    )
 
 
 def check_centres(centres: Centres, points: np.ndarray) -> None:
@@ -238,8 +220,7 @@ def check_centres(centres: Centres, points: np.ndarray) -> None:
     away = np.abs(points - centres.placed(points)).max(axis=1)
     if (worst := float(away.max())) > LAST_BITS * coordinate_rounding(points):
         raise InvalidInputError(
-            f"centres that follow other nodes must lie where these say, node {int(away.argmax())} does not "
-            f"by {worst:.3g}: let mesh.serendipity place them"
+            f"centre {int(away.argmax())} is {worst:.3g} off its nodes: let mesh.serendipity place it"
         )
 
 

@@ -257,8 +257,8 @@ def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
             return cell
     if dim == 3 and cells.ndim == 2 and cells.shape[1] == 20:
         raise InvalidInputError(
-            "hexahedra of 20 nodes are those of 27 whose centres follow: add these, points, cells = "
-            "in_vtk_order(points, cells), and take serendipity(BodyMesh(points, cells))"
+            "hexahedra of 20 nodes are those of 27 whose centres follow: add these by in_vtk_order(points, "
+            "cells) and take serendipity(BodyMesh(points, cells))"
         )
     known = " or ".join(
         f"(n_cells, {cell.nodes.shape[0]}) for {cell.plural}"
@@ -268,8 +268,7 @@ def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
     if not known:
         raise InvalidInputError(f"dim must be 2 or 3, got {dim}: give the number of coordinates of a node")
     raise InvalidInputError(
-        f"cells in {dim} dimensions must have shape {known}, got {cells.shape}: give the nodes of every "
-        "cell in VTK order, and dim=2 for a plane mesh"
+        f"cells in {dim} dimensions must have shape {known}, got {cells.shape}: dim=2 is for a plane mesh"
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenics_contact._base.checks import check_each
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
@@ -65,8 +66,7 @@ class Chart:
             image = np.asarray(self.map(chosen), dtype=np.float64)
         if image.shape != chosen.shape or not np.isfinite(image).all():
             raise InvalidInputError(
-                f"Chart.map must return finite points of shape {chosen.shape}, one for each row of "
-                f"coordinates, got shape {image.shape} or NaN: write it for an array of coordinates"
+                f"Chart.map must return finite points of shape {chosen.shape}, got shape {image.shape} or NaN"
             )
         image = image if self.turn is None else image @ self.turn.T
         return image if self.shift is None else image + self.shift
@@ -138,13 +138,12 @@ def check_chart(chart: Chart, points: np.ndarray, farthest: float = 1e-9) -> Non
     """Reject a chart of which nodes are no images, or too far from them for the extent of the mesh."""
     if np.shape(chart.coordinates) != points.shape:
         raise InvalidInputError(
-            f"Chart.coordinates must have shape {points.shape}, those of every node, got "
-            f"{np.shape(chart.coordinates)}: give as many coordinates as the points have"
+            f"Chart.coordinates must have shape {points.shape}, got {np.shape(chart.coordinates)}"
         )
     away = np.linalg.norm(chart.points() - points, axis=1)
-    off = away > farthest * np.ptp(points, axis=0).max()
-    if off.any():
-        raise InvalidInputError(
-            f"nodes must be the images of their coordinates by the chart, {np.count_nonzero(off)} of "
-            f"{len(off)} are not, by up to {away.max():.3g}: make the points by its map"
-        )
+    check_each(
+        away <= farthest * np.ptp(points, axis=0).max(),
+        "nodes must lie at the images of their coordinates by the chart",
+        "make the points by its map",
+        lambda node: f"node {node} by {away[node]:.3g}",
+    )

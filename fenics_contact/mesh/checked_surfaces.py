@@ -7,9 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fenics_contact._base.checks import check_each
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.faces import (
     boundary_faces,
+    check_on_boundary,
     corners_of,
     is_triangle,
     match_faces,
@@ -24,9 +26,7 @@ def integers(values: ArrayLike, name: str) -> np.ndarray:
     """Return integers as a read-only copy, int64."""
     array = np.asarray(values)
     if not np.issubdtype(array.dtype, np.integer):
-        raise InvalidInputError(
-            f"{name} must be integers, got {array.dtype}: convert with .astype(numpy.int64)"
-        )
+        raise InvalidInputError(f"{name} must be integers, got {array.dtype}: use .astype(numpy.int64)")
     copied = np.array(array, dtype=np.int64)
     copied.setflags(write=False)
     return copied
@@ -36,8 +36,7 @@ def check_range(nodes: np.ndarray, n_nodes: int, name: str) -> None:
     """Reject numbers that are not those of nodes."""
     if nodes.size and (nodes.min() < 0 or nodes.max() >= n_nodes):
         raise InvalidInputError(
-            f"{name} must number nodes 0 to {n_nodes - 1}, got {nodes.min()} to {nodes.max()}: "
-            "node numbers count the rows of points from zero"
+            f"{name} must number nodes 0 to {n_nodes - 1}, got {nodes.min()} to {nodes.max()}"
         )
 
 
@@ -61,8 +60,8 @@ def checked_surfaces(
             array = widened(array, boundary.shape[1])
         if array.ndim != 2 or array.shape[1] != boundary.shape[1] or array.shape[0] == 0:
             raise InvalidInputError(
-                f"surface '{name}' must have shape (n_facets, {boundary.shape[1]}) with at least one facet, "
-                f"got {array.shape}: leave out a surface that is empty"
+                f"surface '{name}' must have shape (n ≥ 1, {boundary.shape[1]}), a row per facet, got "
+                f"{array.shape}"
             )
         check_range(array, n_nodes, f"surface '{name}'")
         if triangles.any():
@@ -91,32 +90,22 @@ def _checked_parts(name: str, facets: np.ndarray, boundary: np.ndarray, triangle
 def _face_numbers(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int) -> np.ndarray:
     """Return the numbers of the boundary faces that the facets are, (n_facets,)."""
     numbers = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
-    lost = np.flatnonzero(numbers < 0)
-    if lost.size:
-        raise InvalidInputError(
-            f"surface '{name}' must consist of boundary faces of the cells, {lost.size} of {facets.shape[0]} "
-            f"are not, first facet {lost[0]} with nodes {facets[lost[0]].tolist()}: take them from "
-            f"`boundary_faces(cells, dim={dim})`"
-        )
+    check_on_boundary(numbers, f"surface '{name}'", facets, dim)
     _check_once(name, facets, numbers)
     there = boundary[numbers]
-    wrong = np.flatnonzero((np.sort(facets, axis=1) != np.sort(there, axis=1)).any(axis=1))
-    if wrong.size:
-        raise InvalidInputError(
-            f"surface '{name}' must list the corners of each facet, then the midpoints of its edges, then "
-            f"its centre, {wrong.size} of {facets.shape[0]} facets have other nodes, first facet {wrong[0]} "
-            f"with nodes {facets[wrong[0]].tolist()} instead of {there[wrong[0]].tolist()}: take them from "
-            f"`boundary_faces(cells, dim={dim})`"
-        )
+    check_each(
+        (np.sort(facets, axis=1) == np.sort(there, axis=1)).all(axis=1),
+        f"surface '{name}' must list the corners of each facet, then the midpoints of its edges, its centre",
+        f"take them from `boundary_faces(cells, dim={dim})`",
+        lambda k: f"facet {k} with nodes {facets[k].tolist()} instead of {there[k].tolist()}",
+    )
     given, known = (start_at_smallest(corners_of(faces, dim)) for faces in (facets, there))
-    same = (given == known).all(axis=1)
-    if not same.all():
-        first = int(np.argmin(same))
-        raise InvalidInputError(
-            f"surface '{name}' must list nodes around each facet with the normal pointing out of the body, "
-            f"{np.count_nonzero(~same)} of {facets.shape[0]} facets do not, first facet {first} with nodes "
-            f"{facets[first].tolist()}: order them with `orient(cells, facets, dim={dim})`"
-        )
+    check_each(
+        (given == known).all(axis=1),
+        f"surface '{name}' must list nodes around each facet with the normal pointing out of the body",
+        f"order them with `orient(cells, facets, dim={dim})`",
+        lambda k: f"facet {k} with nodes {facets[k].tolist()}",
+    )
     return numbers
 
 
@@ -127,6 +116,6 @@ def _check_once(name: str, facets: np.ndarray, numbers: np.ndarray) -> None:
     if twice.size:
         raise InvalidInputError(
             f"surface '{name}' must list every facet once, {twice.size} of {first.size} are listed more "
-            f"often, among them the one with nodes {facets[first[twice[0]]].tolist()}: keep one of each "
-            "(numpy.unique(numpy.sort(facets, axis=1), axis=0, return_index=True))"
+            f"often, such as that with nodes {facets[first[twice[0]]].tolist()}: keep one of each, as by "
+            "numpy.unique"
         )

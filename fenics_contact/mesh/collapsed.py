@@ -23,6 +23,7 @@ from itertools import product
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.checks import check_each
 from fenics_contact._base.display import counted
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import (
@@ -176,8 +177,7 @@ def shape_of(count: int, dim: int) -> Shape:
         if s.dim == dim
     )
     raise InvalidInputError(
-        f"cells in {dim} dimensions must have a known number of nodes, {known}, got {count}: give the nodes "
-        "of every cell in VTK order"
+        f"cells in {dim} dimensions must have {known} nodes, got {count}: list them in VTK order"
     )
 
 
@@ -273,17 +273,17 @@ def check_collapsed(cells: np.ndarray, dim: int) -> None:
     """Reject cells that list nodes twice otherwise than prisms, pyramids and simplices do."""
     order = cell_type_of(cells, dim).order
     for name, mine in (shapes_in(cells, dim) or {}).items():
-        how = collapse(name, order)
-        own = cells[mine][:, how.places]
-        ordered = np.sort(own, axis=1)
-        bad = (own[:, how.columns] != cells[mine]).any(axis=1) | (np.diff(ordered, axis=1) == 0).any(axis=1)
-        if bad.any():
-            first = mine[np.argmax(bad)]
-            raise InvalidInputError(
-                "cells that list a node twice must be prisms, pyramids or simplices as joined_cells makes "
-                f"them, {np.count_nonzero(bad)} are not, first cell {first} with nodes "
-                f"{cells[first].tolist()}: give nodes by shape, joined_cells({{'prism': ...}})"
-            )
+        _check_repeated(cells, mine, collapse(name, order))
+
+
+def _check_repeated(cells: np.ndarray, mine: np.ndarray, how: Collapse) -> None:
+    own = cells[mine][:, how.places]
+    check_each(
+        (own[:, how.columns] == cells[mine]).all(axis=1) & np.diff(np.sort(own, axis=1), axis=1).all(axis=1),
+        "cells that list a node twice must be prisms, pyramids or simplices as joined_cells makes them",
+        "use joined_cells({'prism': ...})",
+        lambda k: f"cell {mine[k]} with nodes {cells[mine[k]].tolist()}",
+    )
 
 
 def joined_cells(cells: Mapping[str, np.ndarray], dim: int = 3) -> np.ndarray:
@@ -318,15 +318,14 @@ def joined_cells(cells: Mapping[str, np.ndarray], dim: int = 3) -> np.ndarray:
         whole = dict(zip((shape.counts[0], shape.counts[2]), (1, 2), strict=True))
         if array.ndim != 2 or array.shape[1] not in whole:
             raise InvalidInputError(
-                f"{shape.plural} must have {' or '.join(map(str, whole))} nodes each, got an array of shape "
-                f"{array.shape}: complete the centres of serendipity cells by in_vtk_order"
+                f"{shape.plural} have {' or '.join(map(str, whole))} nodes, got {array.shape}: see "
+                "in_vtk_order"
             )
         orders.add(whole[array.shape[1]])
         parts.append(array[:, collapse(name, whole[array.shape[1]]).columns])
     if len(orders) != 1:
         raise InvalidInputError(
-            f"joined_cells needs cells of one order, got {'both linear and quadratic' if orders else 'none'}"
-            ": give all with, or all without the nodes between their vertices"
+            f"joined_cells needs cells all linear or all quadratic, got {'both' if orders else 'none'}"
         )
     return np.concatenate(parts)
 

@@ -18,6 +18,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from fenics_contact._base.checks import check_each
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
 from fenics_contact.mesh.collapsed import has_collapsed
@@ -61,10 +62,9 @@ def check_no_coincident_nodes(points: np.ndarray) -> None:
     first, second = pairs[0]
     place = ", ".join(f"{x:.6g}" for x in points[first])
     raise InvalidInputError(
-        f"every node must have a place of its own, {np.unique(pairs).size} of {points.shape[0]} nodes "
-        f"coincide with another, first nodes {first} and {second} at ({place}): the cells around them do not "
-        "hang together; join them with `merge_duplicate_nodes(points, cells)`, or pass "
-        "coincident_nodes=True where they are the two sides of a crack"
+        f"every node must have a place of its own, {np.unique(pairs).size} of {len(points)} nodes coincide "
+        f"with another, first nodes {first} and {second} at ({place}): join them with "
+        "`merge_duplicate_nodes`, or pass coincident_nodes=True where they are the two sides of a crack"
     )
 
 
@@ -95,12 +95,12 @@ def merge_duplicate_nodes(
     position[order] = np.arange(order.size)
     new = position[new.ravel()]
     vertices = np.sort(new[cells], axis=1)
-    lost = np.flatnonzero((np.diff(vertices, axis=1) == 0).any(axis=1))
-    if lost.size:
-        raise InvalidInputError(
-            f"cells must keep their vertices when nodes are joined, {lost.size} of {len(cells)} do not, "
-            f"first cell {lost[0]}: lower the tolerance of {tolerance:g}, or remove these degenerate cells"
-        )
+    check_each(
+        (np.diff(vertices, axis=1) != 0).all(axis=1),
+        "cells must keep their vertices when nodes are joined",
+        f"lower the tolerance of {tolerance:g}, or remove these degenerate cells",
+        "cell {}".format,
+    )
     return points[first[order]], new[cells], new
 
 
@@ -302,8 +302,7 @@ def shared_faces(
     if counts.max() > 2:
         worst = _faces_at(cells, dim, np.flatnonzero(numbers == np.argmax(counts))[:1])[0]
         raise InvalidInputError(
-            f"a face must belong to at most 2 cells, the face with nodes {worst.tolist()} belongs to "
-            f"{counts.max()}: remove duplicated or overlapping cells"
+            f"at most 2 cells may share a face, {counts.max()} share {worst.tolist()}: remove overlaps"
         )
     order = np.argsort(numbers, kind="stable")
     order = order[counts[numbers[order]] == 2]
@@ -336,13 +335,18 @@ def orient(
     """Return boundary facets, whose corners are in any order, in the cells' order: cyclic and outward."""
     boundary, _ = boundary_faces(cells, dim, hanging)
     matches = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
-    if np.any(matches < 0):
-        lost = np.flatnonzero(matches < 0)
-        raise InvalidInputError(
-            f"facets must be boundary faces of the cells, {lost.size} of {facets.shape[0]} are not, first "
-            f"facet {lost[0]} with nodes {facets[lost[0]].tolist()}: take them from `boundary_faces(cells)`"
-        )
+    check_on_boundary(matches, "facets", facets, dim)
     return boundary[matches]
+
+
+def check_on_boundary(matches: np.ndarray, name: str, facets: np.ndarray, dim: int) -> None:
+    """Reject facets without a match among the boundary faces."""
+    check_each(
+        matches >= 0,
+        f"{name} must consist of boundary faces of the cells",
+        f"take them from `boundary_faces(cells, dim={dim})`",
+        lambda k: f"facet {k} with nodes {facets[k].tolist()}",
+    )
 
 
 def start_at_smallest(facets: np.ndarray) -> np.ndarray:

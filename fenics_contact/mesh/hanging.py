@@ -139,8 +139,7 @@ def nodes_to_hold(hanging: DependentNodes, surface: str, facets: np.ndarray) -> 
     if outside.any():
         raise InvalidInputError(
             f"surfaces with supports must contain the masters of their hanging nodes, {surface!r} lacks some "
-            f"of {np.count_nonzero(outside)} nodes, the first {hanging.nodes[mine][outside][0]} with "
-            f"masters {np.unique(masters[outside][0]).tolist()}: take all facets on the faces of larger cells"
+            f"of {np.count_nonzero(outside)} nodes: take all facets on the faces of larger cells"
         )
     return np.setdiff1d(nodes, hanging.nodes)
 
@@ -149,10 +148,9 @@ def require_none(dependent: DependentNodes, what: str, remedy: str) -> None:
     """Reject the hanging nodes or following centres of a mesh for what cannot deal with them."""
     if isinstance(dependent, Centres) and dependent:
         raise InvalidInputError(
-            f"{what} needs complete cells, this mesh has {len(dependent.nodes)} centres that follow other "
-            "nodes: make these unknowns by mesh.completed"
+            f"{what} needs complete cells, {len(dependent.nodes)} centres follow: take mesh.completed"
         )
     if dependent:
         raise InvalidInputError(
-            f"{what} needs a mesh without hanging nodes, this one has {len(dependent.nodes)}: {remedy}"
+            f"{what} needs a mesh without hanging nodes, got {len(dependent.nodes)}: {remedy}"
         )

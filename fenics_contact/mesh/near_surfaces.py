@@ -45,9 +45,7 @@ def near_surfaces(
         near = {name: sides[name].grown(mask, along) for name, mask in near.items()}
         for a, b in ((one, other), (other, one)):
             if f"near {b}" in surfaces[a]:
-                raise InvalidInputError(
-                    f"body {a!r} must have no surface 'near {b}' yet, it has one: rename it, or use it"
-                )
+                raise InvalidInputError(f"body {a!r} must have no surface 'near {b}' yet: rename or use it")
             surfaces[a][f"near {b}"] = sides[a].facets[near[a]]
     return {name: replace(mesh, surfaces=surfaces[name]) for name, mesh in meshes.items()}, pairs
 

@@ -43,21 +43,17 @@ def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
     """
     if mesh.grid is None:
         raise InvalidInputError(
-            "box_partition needs a structured mesh, this one has grid None: use "
-            "`bisection_partition(mesh, parts)`"
+            "box_partition needs a structured mesh, this one has grid None: use `bisection_partition`"
         )
     if not isinstance(boxes, Sequence | np.ndarray) or np.shape(boxes) != (mesh.dim,):
         number = {2: "two", 3: "three"}[mesh.dim]
-        raise InvalidInputError(
-            f"boxes must be {number} integers, got {boxes!r}: give one for each grid direction"
-        )
+        raise InvalidInputError(f"boxes must be {number} integers, one a direction, got {boxes!r}")
     counts = mesh.grid.max(axis=0) + 1
     for d in range(mesh.dim):
         check_count(boxes[d], f"boxes[{d}]")
         if boxes[d] > counts[d]:
             raise InvalidInputError(
-                f"boxes[{d}] must be at most the {counts[d]} layers of cells in that direction, got "
-                f"{boxes[d]}: take fewer boxes or a finer mesh"
+                f"boxes[{d}] must be at most the {counts[d]} layers of cells, got {boxes[d]}"
             )
     position = mesh.grid * np.asarray(boxes) // counts
     return np.ravel_multi_index(tuple(position.T), boxes).astype(np.int64)
@@ -67,9 +63,7 @@ def check_parts(mesh: BodyMesh, parts: int) -> None:
     """Reject a number of subdomains into which a mesh cannot be cut."""
     check_count(parts, "parts")
     if parts > mesh.n_cells:
-        raise InvalidInputError(
-            f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer parts"
-        )
+        raise InvalidInputError(f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer")
 
 
 def _face_pieces(mesh: BodyMesh, partition: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -102,10 +96,7 @@ def merge_pieces(
         links = np.concatenate([piece[pairs], piece[pairs][:, ::-1]])
         links = links[~done[links[:, 0]] & done[links[:, 1]]]
         if links.shape[0] == 0:
-            raise InvalidInputError(
-                f"{_named(body)} must be connected through faces to be cut, {np.count_nonzero(~done)} pieces "
-                f"of it have no neighbour: {_APART}"
-            )
+            raise _in_pieces(body, f"{np.count_nonzero(~done)} pieces of it have no neighbour")
         shared, counts = np.unique(links, axis=0, return_counts=True)
         order = np.argsort(counts, kind="stable")  # the last assignment wins: the one with most faces
         target = owner.copy()
@@ -162,6 +153,10 @@ def _named(body: str) -> str:
     return f"body '{body}'" if body else "a mesh"
 
 
+def _in_pieces(body: str, found: str) -> InvalidInputError:
+    return InvalidInputError(f"{_named(body)} must be connected through faces to be cut, {found}: {_APART}")
+
+
 def check_one_piece(mesh: BodyMesh, body: str = "", pairs: np.ndarray | None = None) -> None:
     """Reject a mesh that is not connected through faces, other than where a section cuts it."""
     mesh, pairs = (closed(mesh), None) if mesh.cuts else (mesh, pairs)
@@ -169,10 +164,8 @@ def check_one_piece(mesh: BodyMesh, body: str = "", pairs: np.ndarray | None = N
     piece, owner = _face_pieces(mesh, np.zeros(mesh.n_cells, dtype=np.int64), pairs)
     if owner.size > 1:
         sizes = np.sort(np.bincount(piece))[::-1]
-        raise InvalidInputError(
-            f"{_named(body)} must be connected through faces to be cut, it consists of {owner.size} parts, "
-            f"the largest of {sizes[0]} and {sizes[1]} cells: {_APART}"
-        )
+        largest = f"the largest of {sizes[0]} and {sizes[1]} cells"
+        raise _in_pieces(body, f"it consists of {owner.size} parts, {largest}")
 
 
 def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> None:
@@ -182,11 +175,11 @@ def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") 
     pieces = np.bincount(owner)
     torn = np.flatnonzero(pieces > 1)
     if torn.size:
+        of = f" of {_named(body)}" if body else ""
         raise InvalidInputError(
-            f"every subdomain{f' of {_named(body)}' if body else ''} must be connected through cell faces, "
-            f"{torn.size} of {pieces.size} are not, "
-            f"first subdomain {torn[0]} in {pieces[torn[0]]} pieces: cut differently, or "
-            "give each piece to a neighbour with `merge_pieces`"
+            f"every subdomain{of} must be connected through cell faces, {torn.size} of {pieces.size} are "
+            f"not, first subdomain {torn[0]} in {pieces[torn[0]]} pieces: cut differently or use "
+            "`merge_pieces`"
         )
 
 
@@ -194,15 +187,14 @@ def _checked_partition(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
     array = np.asarray(partition)
     if array.shape != (mesh.n_cells,) or not np.issubdtype(array.dtype, np.integer):
         raise InvalidInputError(
-            f"partition must be integers of shape ({mesh.n_cells},), got {array.dtype} of shape "
-            f"{array.shape}: give the subdomain number of every cell"
+            f"partition must be integers of shape ({mesh.n_cells},), got {array.dtype} of shape {array.shape}"
         )
     if array.min() < 0:
         raise InvalidInputError(f"subdomain numbers must start at 0, got {array.min()}: shift them")
     empty = np.flatnonzero(np.bincount(array) == 0)
     if empty.size:
         raise InvalidInputError(
-            f"subdomains must be numbered without holes, number {empty[0]} of {array.max() + 1} has no cell: "
+            f"subdomains must be numbered without holes, number {empty[0]} of {array.max() + 1} is empty: "
             "renumber"
         )
     return array.astype(np.int64)

@@ -86,8 +86,7 @@ def check_node_order(points: np.ndarray, cells: np.ndarray) -> None:
         kind = shape.plural if several else cell_type_of(cells, dim).plural.removeprefix("quadratic ")
         raise InvalidInputError(
             f"the nodes of quadratic {kind} must be in the order of VTK, the {shape.corners} corners and "
-            f"then those between the corners {expected}, but by their coordinates they are in the order "
-            f"{places} of these: give points, cells = in_vtk_order(points, cells), or check the coordinates"
+            f"then those between the corners {expected}, got the order {places}: use in_vtk_order"
         )
 
 

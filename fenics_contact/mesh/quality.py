@@ -227,14 +227,11 @@ def check_shapes(
     distances = {}
     for name, shape in shapes.items():
         if name not in surfaces:
-            raise InvalidInputError(
-                f"shapes names surface {name!r}, the mesh has {sorted(surfaces)}: use one of them"
-            )
+            raise InvalidInputError(f"shapes names surface {name!r}, the mesh has {sorted(surfaces)}")
         dim = getattr(shape, "dim", points.shape[1])
         if dim != points.shape[1]:
             raise InvalidInputError(
-                f"the shape of surface {name!r} must be of the mesh's dimension {points.shape[1]}, "
-                f"{type(shape).__name__} is for {dim}: in the plane give curves, such as a Circle"
+                f"surface {name!r} needs a shape of dimension {points.shape[1]}, got one of {dim}"
             )
         away = distance_in_edges(points, surfaces[name], shape)
         away[np.isin(np.unique(surfaces[name]), hanging)] = 0.0
@@ -242,8 +239,8 @@ def check_shapes(
         if off.any():
             raise InvalidInputError(
                 f"the nodes of surface {name!r} must lie on its shape, {np.count_nonzero(off)} of {len(off)} "
-                f"lie off {type(shape).__name__} by more than a tenth of an edge, up to {away.max():.3g} "
-                "edges: check its place and size and the unit of length, or give the shape of another surface"
+                f"lie off {type(shape).__name__} by up to {away.max():.3g} edges: check its place, size and "
+                "unit of length"
             )
         _check_side(name, points, surfaces[name], shape)
         distances[name] = away
@@ -277,8 +274,7 @@ def _check_side(
     if len(wrong):
         turned = parts[wrong[0]]
         raise InvalidInputError(
-            f"the shape of surface {name!r} must have its normals out of the body, those of "
-            f"{type(turned).__name__} point into it: {_turning(turned)}"
+            f"{type(turned).__name__} of surface {name!r} points into the body: {_turning(turned)}"
         )
 
 

@@ -225,22 +225,17 @@ def _checked_marks(mesh: BodyMesh, marked: ArrayLike) -> np.ndarray:
     """Return the numbers of the marked cells."""
     if mesh.has_several_shapes:
         raise InvalidInputError(
-            f"refined needs cells of one shape, got {mesh.cells_in_words}: take a finer mesh of these, or "
-            "one of tetrahedra"
+            f"refined needs cells of one shape, got {mesh.cells_in_words}: take tetrahedra"
         )
     if mesh.coincident_nodes or mesh.cuts:
-        raise InvalidInputError(
-            "refined needs a mesh without coincident nodes, got one with a crack or a section: refine the "
-            "mesh before it is cut"
-        )
+        raise InvalidInputError("refined needs a mesh without coincident nodes: refine before it is cut")
     marks = np.asarray(marked)
     if marks.dtype == bool and marks.shape == (mesh.n_cells,):
         marks = np.flatnonzero(marks)
     fits = marks.ndim == 1 and np.issubdtype(marks.dtype, np.integer) and marks.size > 0
     if not fits or marks.min() < 0 or marks.max() >= mesh.n_cells:
         raise InvalidInputError(
-            f"marked must be at least one of the cells 0 to {mesh.n_cells - 1}, or a bool for each, got "
-            f"{brief(marked)}: give the cells to halve"
+            f"marked must be at least one of the cells 0 to {mesh.n_cells - 1}, or bools, got {brief(marked)}"
         )
     if halves_together(mesh) and len(np.unique(marks)) < mesh.n_cells:
         raise InvalidInputError(

@@ -70,10 +70,9 @@ def serendipity(mesh: BodyMesh) -> BodyMesh:
     """
     centres = centres_of(mesh.cells, mesh.dim)
     if not centres:
+        given = cell_type_of(mesh.cells, mesh.dim).plural
         raise InvalidInputError(
-            "serendipity needs quadratic cells with faces of four corners, got "
-            f"{cell_type_of(mesh.cells, mesh.dim).plural}: make them quadratic first (mesh.quadratic); "
-            "simplices have no centres"
+            f"serendipity needs quadratic quadrilaterals or hexahedra, got {given}: see mesh.quadratic"
         )
     result = copy(mesh)
     result.__dict__.pop("linear", None)

@@ -177,7 +177,7 @@ def test_what_is_not_built_is_refused_in_words() -> None:
         DesignGeometry(scene, None, [])
     lean = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (1, 1, 1))))
     whole = Scene({"box": Body(lean, soft)}, [Support("box", "x0")])
-    with pytest.raises(InvalidInputError, match=r"a design with body 'box' needs complete cells, .* 7 cen"):
+    with pytest.raises(InvalidInputError, match=r"a design with body 'box' needs complete cells, 7 cen"):
         DesignGeometry(whole, None, [])
     with pytest.raises(InvalidInputError, match=r"a known number of nodes, .* 6/15/18 for prisms, .* 7:"):
         in_vtk_order(mesh.points, np.arange(7)[None])

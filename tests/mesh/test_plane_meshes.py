@@ -83,9 +83,7 @@ def test_every_inner_edge_makes_a_pair_of_neighbours() -> None:
 def test_edges_in_the_wrong_direction_are_refused_and_turned() -> None:
     mesh = rectangle((0, 0), (2, 1), (2, 1))
     backwards = mesh.surfaces["y0"][:, ::-1]
-    with pytest.raises(
-        InvalidInputError, match=r"'low' .* 2 of 2 facets .* `orient\(cells, facets, dim=2\)`"
-    ):
+    with pytest.raises(InvalidInputError, match=r"'low' .* 2 of 2 do not.* `orient\(cells, facets, dim=2\)`"):
         BodyMesh(mesh.points, mesh.cells, {"low": backwards})
     assert np.array_equal(orient(mesh.cells, backwards, dim=2), mesh.surfaces["y0"])
 
@@ -145,7 +143,7 @@ def test_the_reference_cell_has_its_volume_and_faces_outwards(name: str) -> None
 def test_triangles_of_three_coordinates_are_no_solid() -> None:
     mesh = rectangle((0, 0), (1, 1), (1, 1), "triangle")
     with pytest.raises(
-        InvalidInputError, match=r"cells in 3 dimensions .* got \(2, 3\): .* dim=2 for a plane"
+        InvalidInputError, match=r"cells in 3 dimensions .* got \(2, 3\): dim=2 is for a plane"
     ):
         boundary_faces(mesh.cells)
     with pytest.raises(InvalidInputError, match="dim must be 2 or 3, got 1"):
@@ -208,7 +206,7 @@ def test_pieces_that_meet_in_a_node_only_are_found() -> None:
 
 
 def test_three_numbers_are_no_plane_box() -> None:
-    with pytest.raises(InvalidInputError, match=r"boxes must be two integers, got \(1, 1, 1\)"):
+    with pytest.raises(InvalidInputError, match=r"boxes must be two integers, .*got \(1, 1, 1\)"):
         box_partition(rectangle((0, 0), (1, 1), (1, 1)), (1, 1, 1))
 
 

@@ -154,11 +154,11 @@ def test_facets_with_other_midpoints_than_the_cells_are_refused() -> None:
     facets = mesh.surfaces["y0"].copy()
     facets[:, 2] = facets[::-1, 2]
     with pytest.raises(
-        InvalidInputError, match=r"corners of each facet, then the midpoints .* 2 of 2 facets"
+        InvalidInputError, match=r"corners of each facet, then the midpoints .* 2 of 2 do not"
     ):
         BodyMesh(mesh.points, mesh.cells, {"y0": facets})
     turned = mesh.surfaces["y0"][:, [1, 0, 2]]
-    with pytest.raises(InvalidInputError, match="with the normal pointing out of the body, 2 of 2 facets"):
+    with pytest.raises(InvalidInputError, match="with the normal pointing out of the body, 2 of 2"):
         BodyMesh(mesh.points, mesh.cells, {"y0": turned})
 
 

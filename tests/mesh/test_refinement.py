@@ -182,7 +182,7 @@ def test_what_cannot_be_refined_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="refined all together, got 1 of 4 cells: mark all, or"):
         refined(quadratic(rectangle((0, 0), (1, 1), (2, 2))), [0])
     for marks in ([], [mesh.n_cells], [-1], [0.5], np.zeros(mesh.n_cells, dtype=bool), [[0]]):
-        with pytest.raises(InvalidInputError, match="at least one of the cells 0 to 29, or a bool for each"):
+        with pytest.raises(InvalidInputError, match="at least one of the cells 0 to 29, or bools"):
             refined(mesh, marks)
     cracked = BodyMesh(mesh.points, mesh.cells, mesh.surfaces, coincident_nodes=True)
     with pytest.raises(InvalidInputError, match="without coincident nodes"):

@@ -136,7 +136,7 @@ def test_an_unknown_surface_is_refused_by_whoever_names_it(user: str, parts: dic
 
 def test_an_empty_contact_surface_cannot_be_made() -> None:
     mesh = block((0, 0, 0), (1, 1, 1), (1, 1, 1))
-    with pytest.raises(InvalidInputError, match=r"'contact' must have .* at least one facet, got \(0, 4\)"):
+    with pytest.raises(InvalidInputError, match=r"'contact' must have .*, a row per facet, got \(0, 4\)"):
         BodyMesh(mesh.points, mesh.cells, {"contact": mesh.surfaces["z0"][:0]})
 
 
@@ -145,7 +145,7 @@ def test_coordinates_that_are_no_numbers_are_refused(bad: float) -> None:
     scene = stack()
     points = scene.bodies["lower"].mesh.points.copy()
     points[3, 1] = bad
-    with pytest.raises(InvalidInputError, match=r"points must be finite .*, 1 of 8 are not, first node 3"):
+    with pytest.raises(InvalidInputError, match=r"finite coordinates below .*, 1 of 8 do not, first node 3"):
         scene.moved({"lower": points})
 
 
