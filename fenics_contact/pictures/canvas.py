@@ -94,10 +94,7 @@ class Picture:
             InvalidInputError: If the picture was written to no file.
         """
         if self.path is None:
-            raise InvalidInputError(
-                "this needs the file of a picture, but the picture was not written: give the plot_ function "
-                "a path, such as 'stress.png'"
-            )
+            raise InvalidInputError("the picture was not written to a file: give plot_ a path, 'a.png'")
         return str(self.path)
 
     def __str__(self) -> str:
@@ -187,9 +184,8 @@ def check_renderer() -> None:
     if ending:
         window = os.environ.get(_CHOICE, "not set")
         raise MissingRequirementError(
-            f"pictures need EGL, OSMesa or an X server to draw with, but a trial rendering {ending} "
-            f"(VTK_DEFAULT_OPENGL_WINDOW is {window}): install EGL (Debian: apt-get install libegl1; "
-            "elsewhere what brings libEGL.so.1) and set VTK_DEFAULT_OPENGL_WINDOW=vtkEGLRenderWindow",
+            f"pictures need EGL, OSMesa or X, a trial rendering {ending} ({_CHOICE} is {window}): "
+            "apt-get install libegl1 and set VTK_DEFAULT_OPENGL_WINDOW=vtkEGLRenderWindow",
             name="libegl1",
         )
 
@@ -481,10 +477,15 @@ def checked_range(clim: tuple[float, float]) -> tuple[float, float]:
     """Return a colour range if it is finite and not empty, else raise."""
     low, high = (float(value) for value in clim)
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InvalidInputError(
-            f"clim must be a finite range (low, high) with low < high, got {clim}: widen it"
-        )
+        raise InvalidInputError(f"clim must be finite (low, high) with low < high, got {clim}: widen it")
     return low, high
+
+
+def checked_factor(name: str, factor: float) -> float:
+    """Return the factor of a movement if it is finite, else raise."""
+    if not np.isfinite(factor):
+        raise InvalidInputError(f"{name} must be finite, got {factor}: give a factor, such as 10")
+    return float(factor)
 
 
 def written(value: float, digits: int = 4) -> str:

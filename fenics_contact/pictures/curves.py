@@ -115,8 +115,7 @@ def _checked(name: str, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     x, y = (np.asarray(values, dtype=np.float64) for values in curve)
     if x.ndim != 1 or x.shape != y.shape or not len(x):
         raise InvalidInputError(
-            f"curve {name!r} must have one value for each place, got {y.shape} for {x.shape}: pass two "
-            "arrays of the same length"
+            f"curve {name!r} must have one value for each place, got {y.shape} for {x.shape}: match them"
         )
     return x, y
 

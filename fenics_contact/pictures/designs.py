@@ -36,6 +36,7 @@ from fenics_contact.pictures.canvas import (
     add_colour_bar,
     balls,
     change,
+    checked_factor,
     checked_range,
     checked_reach,
     draw_picture,
@@ -159,14 +160,11 @@ def _check(first: State, best: State, pair: int) -> None:
     ]
     if cells[0] != cells[1]:
         raise InvalidInputError(
-            f"before and after must have the same bodies and cells, got {cells[0]} and {cells[1]}: give two "
-            "designs of one scene"
+            f"before and after must have the same bodies and cells, got {cells[0]} and {cells[1]}"
         )
     checked_pair(first, pair)
     if not np.any(first.contact.normal_force > 0):
-        raise InvalidInputError(
-            "a picture of before and after needs contact forces before, got none: draw with plot_stress"
-        )
+        raise InvalidInputError("before needs contact forces, got none: draw with plot_stress")
 
 
 def _draw_patches(
@@ -325,10 +323,6 @@ def plot_control_net(
         raise InvalidInputError(
             f"there are {len(problem.designs)} designs, got number {design}: count from 0"
         )
-    if magnify is not None and not np.isfinite(magnify):
-        raise InvalidInputError(
-            f"magnify must be finite, got {magnify}: give the factor of the movement, such as 5"
-        )
     one, ends = problem.designs[design], np.cumsum([each.size for each in problem.designs])
     reference, moved = problem.scene.bodies[one.body].mesh.points, problem.points_of(alpha)[one.body]
     part, surface, dim = np.split(np.asarray(alpha), ends[:-1])[design], one.lattice, reference.shape[1]
@@ -337,7 +331,7 @@ def plot_control_net(
     outward = np.einsum("nd,nd->n", movement, surface.directions)
     largest = float(np.abs(outward).max()) or 1.0
     shown, named = (-largest, largest) if clim is None else checked_range(clim), units or Units()
-    factor = _chosen_factor(start, movement) if magnify is None else float(magnify)
+    factor = _chosen_factor(start, movement) if magnify is None else checked_factor("magnify", magnify)
     shape = (*surface.counts, dim)
     surfaces = start.reshape(shape), (start + factor * movement).reshape(shape)
     nets = net[0], net[0] + factor * (net[1] - net[0])
@@ -448,17 +442,11 @@ def plot_convergence(
     """
     target = png_path(path)
     if not isinstance(history, Sequence) or not history or not isinstance(history[0], Record):
-        raise InvalidInputError(
-            "a diagram of convergence needs the records of an optimisation, got "
-            f"{type(history).__name__}: give result.history"
-        )
+        raise InvalidInputError(f"history must be result.history of a run, got {type(history).__name__}")
     objective = np.array([record.value for record in history])
     kind = np.array([record.kind.value for record in history])
     if logarithmic and np.nanmin(objective) <= 0.0:
-        raise InvalidInputError(
-            f"a logarithmic diagram needs a positive objective, got {np.nanmin(objective):g}: leave "
-            "logarithmic=False"
-        )
+        raise InvalidInputError(f"logarithmic=True needs a positive objective, got {np.nanmin(objective):g}")
     number, centre = np.arange(len(objective)), np.isin(kind, ("start", "serious", "refined"))
     first, last = objective[centre][0], objective[centre][-1]
     words = headline(title, f"{label} {change(first, last)}")

@@ -344,7 +344,7 @@ def _clipped(bodies: Bodies, clip: Clip, *, plane: bool) -> dict[str, pv.Unstruc
         raise InvalidInputError("clip is for bodies in space, these are plane: leave it out")
     if len(clip) != 2 or np.ndim(clip[0]) != 1:
         raise InvalidInputError(
-            f"clip must be a point and a normal, got {clip!r}: give ((0, 2, 0), (0, -1, 0)) to cut at y = 2"
+            f"clip must be (point, normal), got {clip!r}: at y = 2 ((0, 2, 0), (0, -1, 0))"
         )
     point, towards = clip
     normal = unit_vector("the normal of clip", towards, 3)
@@ -354,8 +354,7 @@ def _clipped(bodies: Bodies, clip: Clip, *, plane: bool) -> dict[str, pv.Unstruc
     kept = {name: part for name, part in parts.items() if part.n_cells}
     if not kept:
         raise InvalidInputError(
-            f"clip must leave something of the bodies, got the point {point!r} and the normal {towards!r}, "
-            "which points to all of them: turn the normal around, or move the point"
+            f"clip leaves nothing of the bodies, got {point!r} and {towards!r}: reverse the normal"
         )
     return kept
 

@@ -33,7 +33,7 @@ from fenics_contact.pictures.canvas import (
     written,
 )
 from fenics_contact.pictures.curves import LOOKS
-from fenics_contact.pictures.section import cells_of, is_plane, points_of
+from fenics_contact.pictures.section import cells_of, chosen_bodies, is_plane, points_of
 from fenics_contact.results.fields import in_space
 from fenics_contact.results.multi_block import body_grid
 
@@ -72,8 +72,7 @@ def plot_levels(
     target = png_path(path)
     if not series or not all(len(levels) for levels in series.values()):
         raise InvalidInputError(
-            "a picture of levels needs at least one series with a level, got none: pass {'adaptive': "
-            "result.levels}"
+            "a picture of levels needs a level, got none: pass {'adaptive': result.levels}"
         )
 
     def draw(paper: BinaryIO) -> None:
@@ -144,10 +143,7 @@ def plot_meshes(
     target = png_path(path)
     dims = {scene.dim for scene in scenes.values()}
     if len(dims) != 1:
-        raise InvalidInputError(
-            f"a picture of meshes needs scenes of one dimension, got {sorted(dims) or 'none'}: draw plane "
-            "scenes and those in space apart"
-        )
+        raise InvalidInputError(f"scenes must have one dimension, got {sorted(dims)}: draw them apart")
     shown = {words: _grids(scene, bodies) for words, scene in scenes.items()}
     every = np.concatenate([points_of(grids) for grids in shown.values()])
     plane = all(is_plane(grid) for grids in shown.values() for grid in grids.values())
@@ -184,14 +180,8 @@ _LOOK = {
 
 def _grids(scene: Scene, bodies: Sequence[str]) -> dict[str, pv.UnstructuredGrid]:
     """Return the meshes of the chosen bodies; quadratic cells are cut into linear ones."""
-    known = scene.deforming
-    strange = [name for name in bodies if name not in known]
-    if strange:
-        raise InvalidInputError(
-            f"bodies must be some of {', '.join(map(repr, known))}, got {', '.join(map(repr, strange))}: "
-            "leave them out for all"
-        )
-    meshes = {name: known[name].mesh for name in bodies or known}
+    chosen = chosen_bodies(scene.deforming, bodies or list(scene.deforming))
+    meshes = {name: body.mesh for name, body in chosen.items()}
     return {name: body_grid(mesh.linear, in_space(mesh.points)) for name, mesh in meshes.items()}
 
 

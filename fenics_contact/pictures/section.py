@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pyvista as pv
@@ -36,12 +36,20 @@ from fenics_contact.results.state import State
 
 #: Drawn bodies by name.
 Bodies = Mapping[str, pv.UnstructuredGrid]
+Drawn = TypeVar("Drawn")
 
 
 def drawn_bodies(state: State) -> dict[str, pv.UnstructuredGrid]:
     """Return the undeformed bodies, with linear cells and all fields. Collective."""
     blocks = state.to_pyvista(linear=True)
     return {name: blocks[name] for name in blocks.keys()}
+
+
+def chosen_bodies(bodies: Mapping[str, Drawn], names: Sequence[str]) -> dict[str, Drawn]:
+    """Return the bodies of these names."""
+    if isinstance(names, str) or not names or not set(names) <= set(bodies):
+        raise InvalidInputError(f"bodies must be some of {list(bodies)}, got {names!r}: list their names")
+    return {name: bodies[name] for name in names}
 
 
 def moved(bodies: Bodies, scale: float) -> dict[str, pv.UnstructuredGrid]:
@@ -77,8 +85,7 @@ def linear_cells(name: str, body: pv.UnstructuredGrid) -> tuple[np.ndarray, int,
     body = of_one_type(body)
     if body.n_cells == 0 or len(np.unique(body.celltypes)) != 1:
         raise InvalidInputError(
-            f"fields are drawn on cells of one type, {name!r} has {len(np.unique(body.celltypes))} types: "
-            "give files that write_vtu or ResultSeries wrote"
+            f"cells of {name!r} must be of one type, got {len(np.unique(body.celltypes))}"
         )
     dim, cells = 2 if is_plane(body) else 3, cells_of(body)
     kind = cell_type_of(cells, dim)

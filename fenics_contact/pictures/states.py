@@ -28,6 +28,7 @@ from fenics_contact.pictures.canvas import (
     STRESS_MAP,
     Picture,
     Units,
+    checked_factor,
     checked_range,
     checked_reach,
     draw_picture,
@@ -51,6 +52,7 @@ from fenics_contact.pictures.section import (
     Bodies,
     Spot,
     cells_cut,
+    chosen_bodies,
     component,
     contact_places,
     draw_field,
@@ -119,8 +121,8 @@ def plot_decomposition(
         shape = np.shape(partitions[name]) if name in partitions else "none"
         if shape != (body.mesh.n_cells,):
             raise InvalidInputError(
-                f"partitions[{name!r}] must have shape ({body.mesh.n_cells},), one subdomain per cell, got "
-                f"{shape}: pass the partitions that the scene was cut with"
+                f"partitions[{name!r}] must have shape ({body.mesh.n_cells},), got {shape}: give that of the "
+                "cut"
             )
     bodies: dict[str, pv.UnstructuredGrid] = {}
     count = 0
@@ -201,7 +203,7 @@ def plot_stress(
     """
     target = png_path(path)
     if scale is not None:
-        checked_scale(scale)
+        checked_factor("scale", scale)
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
     if revolved:
@@ -272,14 +274,14 @@ def plot_field(
         >>> plot_field(state, used, clip=((0, 0, 0), (0, 1, 0)), label="share of yield")  # doctest: +SKIP
     """
     target, named = png_path(path), units or Units()
-    checked_scale(scale)
+    checked_factor("scale", scale)
     given = None if clim is None else checked_range(clim)
     state = result if isinstance(result, State) else None
     if revolved:
         check_turned(revolved, state is not None and state.scene.axisymmetric)
     every: Bodies = drawn_bodies(result) if isinstance(result, State) else result
     known = [name for name in every if isinstance(field, str) or name in field]
-    chosen = _chosen_bodies(every, known if bodies is None else bodies)
+    chosen = chosen_bodies(every, known if bodies is None else bodies)
     drawn = {name: linear(name, body) for name, body in chosen.items()}
     if isinstance(field, str):
         values, entry = _named_field(drawn, field, named)
@@ -319,23 +321,11 @@ def _turned(
     return solids, replace(field, values=values), [turned_shape(shape) for shape in obstacles]
 
 
-def _chosen_bodies(bodies: Bodies, names: Sequence[str]) -> dict[str, pv.UnstructuredGrid]:
-    """Return the bodies of these names."""
-    unknown = [name for name in names if name not in bodies]
-    if unknown or not names or isinstance(names, str):
-        raise InvalidInputError(
-            f"bodies must be some of {list(bodies)}, got {names!r}: give a list of their names"
-        )
-    return {name: bodies[name] for name in names}
-
-
 def _named_field(bodies: Bodies, field: str, units: Units) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Return the values of a field by body, and what is known of it."""
     entries = {entry["name"]: entry for entry in field_entries([bodies], units)}
     if field not in entries:
-        raise InvalidInputError(
-            f"field must be one of {', '.join(entries)}, got {field!r}: choose one of them"
-        )
+        raise InvalidInputError(f"field must be one of {', '.join(entries)}, got {field!r}: choose one")
     return {name: component(body, entries[field]) for name, body in bodies.items()}, entries[field]
 
 
@@ -352,28 +342,16 @@ def _own_field(
         nodal, count = own.shape == (body.n_points,), int(cells[name].max(initial=-1)) + 1
         if not nodal and (own.ndim not in (1, 2) or len(own) != count):
             raise InvalidInputError(
-                f"values of your own on {name!r} must be one for each of its {body.n_points} nodes or "
-                f"{count} cells, or a row of Gauss points for each cell, got shape {own.shape}: "
-                "compute them on the mesh of the body"
+                f"values on {name!r} must be one for each of {body.n_points} nodes or {count} cells, or a "
+                f"row of Gauss points for each cell, got shape {own.shape}: use the mesh of the body"
             )
         if not np.isfinite(own).any():
-            raise InvalidInputError(
-                f"values of your own on {name!r} must be finite somewhere, got {own.size} that are not: "
-                "leave this body out"
-            )
+            raise InvalidInputError(f"values on {name!r} must be finite somewhere: leave this body out")
         extremes += [float(np.nanmin(own)), float(np.nanmax(own))]
         means = own.mean(axis=1) if own.ndim == 2 else own
         values[name] = means if nodal else means[cells[name]]
     drawn = np.concatenate(list(values.values()))
     return values, {"label": label or "given values", "unit": "", **range_of([drawn], [extremes])}
-
-
-def checked_scale(scale: float) -> None:
-    """Raise unless a factor of the displacement is finite."""
-    if not np.isfinite(scale):
-        raise InvalidInputError(
-            f"scale must be finite, got {scale}: give the factor of the displacement, such as 10"
-        )
 
 
 def contact_spot(state: State, bodies: Bodies) -> Spot | None:
@@ -455,9 +433,8 @@ def _checked(name: str, cells: int, by_cell: Mapping[str, np.ndarray]) -> np.nda
     if part.shape != (cells,) or not np.all(np.isfinite(part) & (part >= 0)):
         smallest = f", the smallest {part.min()}" if part.size else ""
         raise InvalidInputError(
-            f"by_cell[{name!r}] must hold {cells} numbers, one per cell, finite and not negative, got "
-            f"{f'shape {part.shape}{smallest}' if name in by_cell else 'none'}: give the by_cell(body) of an "
-            "estimate, divided by the norm of the displacement"
+            f"by_cell[{name!r}] must hold {cells} numbers of at least 0, one a cell, got "
+            f"{f'shape {part.shape}{smallest}' if name in by_cell else 'none'}: give that of an estimate"
         )
     return part
 
@@ -502,9 +479,8 @@ def plot_contact_status(
     for name, state in states.items():
         if state.scene.dim == 2 or not 0 <= pair < len(state.scene.contacts):
             raise InvalidInputError(
-                f"maps of the status need states in space with a contact pair {pair}, got {name!r} in "
-                f"{state.scene.dim} dimensions, number of pairs {len(state.scene.contacts)}: "
-                "plot_contact_pressure draws plane states"
+                f"plot_contact_status needs states in space with contact pair {pair}, got {name!r}: in the "
+                "plane use plot_contact_pressure"
             )
     comm = next(iter(states.values())).torn.decomposition.comm
 

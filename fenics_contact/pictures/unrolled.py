@@ -183,8 +183,7 @@ def checked_pair(state: State, pair: int | str) -> int:
         return pair_number(state.scene.contacts, pair)
     if not 0 <= pair < len(state.scene.contacts):
         raise InvalidInputError(
-            f"pair must number one of the scene's {len(state.scene.contacts)} contact pairs from 0, got "
-            f"{pair}: draw a scene with contact"
+            f"pair must be below {len(state.scene.contacts)}, got {pair}: draw a scene with contact"
         )
     return pair
 

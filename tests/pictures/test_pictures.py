@@ -136,7 +136,7 @@ def test_a_net_that_does_not_move_is_drawn_too(tmp_path: Path) -> None:
 def test_control_net_refuses_a_design_that_there_is_not(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="there are 1 designs, got number 1: count from 0"):
         roof().drawn(tmp_path / "net.png", 0.1, design=1)
-    with pytest.raises(InvalidInputError, match="magnify must be finite, got nan: give the factor"):
+    with pytest.raises(InvalidInputError, match="magnify must be finite, got nan: give a factor"):
         roof().drawn(tmp_path / "net.png", 0.1, magnify=np.nan)
     assert not list(tmp_path.iterdir())
 
@@ -190,14 +190,14 @@ def test_a_logarithmic_convergence_leaves_room_beside_a_trial_far_off(tmp_path: 
         return int(np.ptp(np.flatnonzero(blue[:, 60:400].any(axis=1))))
 
     assert height(True) > 1.5 * height(False) > 0
-    needed = "needs a positive objective, got -1: leave logarithmic=False"
+    needed = "logarithmic=True needs a positive objective, got -1"
     with pytest.raises(InvalidInputError, match=needed):
         plot_convergence(history(start=-1.0), logarithmic=True)
 
 
 @pytest.mark.parametrize("given", [object(), [], [3.0, 2.0]])
 def test_convergence_refuses_what_is_no_history(given: Any, tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match=r"the records of an optimisation, got \w+: give result"):
+    with pytest.raises(InvalidInputError, match=r"history must be result.history of a run, got \w+"):
         plot_convergence(given, tmp_path / "history.png")
     assert not list(tmp_path.iterdir())
 
@@ -224,7 +224,7 @@ def test_a_picture_without_a_path_writes_no_file(tmp_path: Path, monkeypatch: py
     assert picture.path is None
     assert str(picture) == "picture without a file"
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(InvalidInputError, match=r"needs the file of a picture.*give the plot_ fun"):
+    with pytest.raises(InvalidInputError, match=r"the picture was not written to a file: give plot_"):
         os.fspath(picture)
 
 
@@ -300,7 +300,7 @@ def test_headline_starts_with_a_capital() -> None:
 
 @pytest.mark.parametrize("clim", [(1.0, 1.0), (2.0, 1.0), (0.0, np.nan), (-np.inf, 0.0)])
 def test_a_range_without_width_is_refused(clim: tuple[float, float]) -> None:
-    with pytest.raises(InvalidInputError, match=r"clim must be a finite range .* widen it"):
+    with pytest.raises(InvalidInputError, match=r"clim must be finite .* widen it"):
         checked_range(clim)
 
 

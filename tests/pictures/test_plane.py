@@ -356,11 +356,11 @@ def test_a_seat_that_moved_by_rounding_does_not_give_way() -> None:
 
 
 def test_what_does_not_belong_together_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match=r"must have the same bodies and cells, got .*two designs"):
+    with pytest.raises(InvalidInputError, match=r"must have the same bodies and cells, got .* and "):
         plot_before_after(plane_block(), touching_blocks())
-    with pytest.raises(InvalidInputError, match=r"pair must number one of .* 1 contact pairs from 0, got 1"):
+    with pytest.raises(InvalidInputError, match=r"pair must be below 1, got 1: draw"):
         plot_before_after(plane_block(), raised(2), pair=1)
-    with pytest.raises(InvalidInputError, match=r"pair must number one of the scene's 0 contact pairs"):
+    with pytest.raises(InvalidInputError, match=r"pair must be below 0, got 0"):
         plot_before_after(pulled("triangle6"), pulled("triangle6"))
 
 
@@ -593,9 +593,9 @@ def test_points_without_friction_have_no_arrows() -> None:
 def test_status_maps_refuse_what_they_cannot_show(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"maps of the status need a state, got none"):
         plot_contact_status({}, tmp_path / "maps.png")
-    with pytest.raises(InvalidInputError, match=r"pair 1, got 'a' in 3 dimensions, number of pairs 1"):
+    with pytest.raises(InvalidInputError, match=r"states in space with contact pair 1, got 'a'"):
         plot_contact_status({"a": touching_blocks()}, tmp_path / "maps.png", pair=1)
-    with pytest.raises(InvalidInputError, match=r"got 'flat' in 2 dimensions, number of pairs 1"):
+    with pytest.raises(InvalidInputError, match=r"states in space with contact pair 0, got 'flat'"):
         plot_contact_status({"flat": plane_block()}, tmp_path / "maps.png")
     assert not list(tmp_path.iterdir())
 
