@@ -193,8 +193,7 @@ def hertz_point(force: float, curvatures: Sequence[float], modulus: float) -> Po
     require_positive(force=force, modulus=modulus, **{"curvatures[0]": low, "curvatures[1]": high})
     if high > SLENDEREST * low:
         raise InvalidInputError(
-            f"curvatures must differ by less than a factor of {SLENDEREST:g}, got {low} and {high}: take "
-            "hertz_line, the surfaces touch along a line"
+            f"curvatures must differ by less than {SLENDEREST:g} times, got {low}, {high}: use hertz_line"
         )
     from scipy.special import ellipe, ellipkm1  # bodies without curved contact do without
 
@@ -303,8 +302,7 @@ def pin_in_hole(force: float, radius: float, clearance: float, modulus: float) -
     require_numbers(clearance=clearance)
     if not 0.0 <= clearance <= 0.1 * radius:
         raise InvalidInputError(
-            f"clearance must lie between 0 and a tenth of the radius {radius}, got {clearance}: take "
-            "hertz_line for a loose pin"
+            f"clearance must lie between 0 and {radius / 10:g}, got {clearance}: use hertz_line"
         )
     wanted = 2.0 * modulus * clearance / force
 
@@ -346,8 +344,7 @@ def roller_relief(position: np.ndarray, length: float, half_width: float | None 
     relative = np.abs(np.asarray(position, dtype=float)) / (length / 2)
     if np.any(~(relative <= 1.0)):
         raise InvalidInputError(
-            f"position must lie within half the length, {length / 2:g}, from the middle of the roller, got "
-            f"{np.max(np.abs(position)):g}: measure it from there"
+            f"position must be within {length / 2:g} of the middle, got {np.max(np.abs(position)):g}"
         )
     if half_width is None:
         with np.errstate(divide="ignore"):

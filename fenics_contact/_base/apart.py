@@ -99,7 +99,7 @@ class OwnProcess:
             reply = self._here.recv()
         except (EOFError, ConnectionError) as lost:
             raise InvalidInputError(
-                f"{self._doing} must come to an end, but the process {self._ending()}: {self._advice}"
+                f"{self._doing} must end, but the process {self._ending()}: {self._advice}"
             ) from lost
         return cast(Found, reply.found())
 

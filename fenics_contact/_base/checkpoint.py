@@ -79,25 +79,16 @@ def read_archive(path: Path, kind: str, fingerprint: Mapping[str, str]) -> Array
     """Read the arrays of a problem."""
     arrays = _loaded(path)
     if str(arrays.pop("_format", "")) != FORMAT:
-        raise InvalidInputError(
-            f"a checkpoint is needed, but {str(path)!r} is another file: give the path of a checkpoint, or a "
-            "new name to start anew"
-        )
+        raise InvalidInputError(f"{str(path)!r} is another file: give a checkpoint or a new name to begin")
     version, stored_kind = int(arrays.pop("_version")), str(arrays.pop("_kind"))
     if version != VERSION:
-        raise InvalidInputError(
-            f"a checkpoint of version {VERSION} is needed, {str(path)!r} is of version {version}: go on with "
-            "the version of fenics_contact that wrote it, or give a new name to start anew"
-        )
+        raise InvalidInputError(f"{str(path)!r} has version {version}, not {VERSION}: use that release")
     if stored_kind != kind:
-        raise InvalidInputError(
-            f"a checkpoint of a {kind} is needed, {str(path)!r} is one of a {stored_kind}: give another path"
-        )
+        raise InvalidInputError(f"{str(path)!r} must be of a {kind}, is of a {stored_kind}: give another")
     unlike = differences(json.loads(str(arrays.pop("_fingerprint"))), fingerprint)
     if unlike:
         raise InvalidInputError(
-            f"the checkpoint {str(path)!r} is of another problem; there and here differ "
-            f"{'; '.join(unlike)}: give the same problem to go on, or a new name to start anew"
+            f"{str(path)!r} differs (there, here) in {'; '.join(unlike)}: give the same problem or a new name"
         )
     return arrays
 
@@ -116,8 +107,7 @@ def _loaded(path: Path) -> Arrays:
         content = path.read_bytes()
     except OSError as error:
         raise InvalidInputError(
-            f"a checkpoint is needed at {str(path)!r}, which cannot be read: {error.strerror or error}; give "
-            "the path of one that can"
+            f"checkpoint {str(path)!r} cannot be read: {error.strerror or error}; give one that can"
         ) from error
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -132,8 +122,7 @@ def _loaded(path: Path) -> Arrays:
     except Exception as error:  # arbitrary bytes can make the libraries raise anything
         reason = str(error) or type(error).__name__
     raise InvalidInputError(
-        f"{str(path)!r} is not a complete checkpoint ({len(content)} bytes; {reason}): restore a copy, or "
-        "move it away to start over"
+        f"{str(path)!r} is not a complete checkpoint ({len(content)} bytes; {reason}): restore or remove it"
     )
 
 
@@ -167,9 +156,7 @@ class Checkpoint:
     def __post_init__(self) -> None:
         """Reject invalid intervals."""
         if self.every < 1:
-            raise InvalidInputError(
-                f"every must be at least 1, got {self.every}: how many evaluations lie between two writes"
-            )
+            raise InvalidInputError(f"every must be at least 1, got {self.every}: it counts evaluations")
 
     def read(self, kind: str, fingerprint: Mapping[str, str], comm: MPI.Comm | None) -> Arrays | None:
         """Return the stored arrays, None if the run starts anew. Collective on ``comm``.
@@ -329,10 +316,7 @@ def interruptible(comm: MPI.Comm | None = None, signals: Sequence[int] = SIGNALS
         ...     solve_steps(problem, steps, checkpoint=Checkpoint("run.npz"))
     """
     if threading.current_thread() is not threading.main_thread():
-        raise InvalidInputError(
-            "signals are heard by the main thread alone, got interruptible in "
-            f"{threading.current_thread().name!r}: enter it in the main thread"
-        )
+        raise InvalidInputError("signals reach the main thread alone: enter interruptible there")
     hearing = Interruption(comm)
     before: dict[int, Any] = {number: signal.signal(number, hearing) for number in signals}
     try:

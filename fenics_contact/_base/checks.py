@@ -34,9 +34,7 @@ STEEPEST = 8.0
 def check_count(value: int, name: str, least: int = 1) -> None:
     """Reject a count that is not an integer from ``least`` to `MOST`."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
-        raise InvalidInputError(
-            f"{name} must be an integer of at least {least}, got {brief(value)}: choose another count"
-        )
+        raise InvalidInputError(f"{name} must be an integer of at least {least}, got {brief(value)}")
     if value > MOST:
         raise InvalidInputError(f"{name} must be at most {MOST}, got {brief(value)}: choose a smaller count")
 
@@ -45,19 +43,14 @@ def check_numbers(**given: Any) -> None:
     """Reject arguments, given by their names, that are not finite numbers, or too large to be multiplied."""
     for name, value in given.items():
         if not _is_number(value):
-            raise InvalidInputError(
-                f"{name} must be a finite number of less than {LARGEST:g}, got {brief(value)}: give another"
-            )
+            raise InvalidInputError(f"{name} must be a finite number below {LARGEST:g}, got {brief(value)}")
 
 
 def check_grading(value: Any) -> None:
     """Reject a grading, the logarithm of a ratio of cells of one mesh, that is negative or too large."""
     check_numbers(grading=value)
     if not 0.0 <= value <= STEEPEST:
-        raise InvalidInputError(
-            f"grading must lie between 0 and 8, got {value}: 0 gives equal cells, 3 makes the smallest 20 "
-            "times smaller than the largest"
-        )
+        raise InvalidInputError(f"grading must be from 0 to {STEEPEST:g}, got {value}: 0 gives equal cells")
 
 
 def check_row(values: Any, name: str, count: int) -> None:
@@ -65,7 +58,7 @@ def check_row(values: Any, name: str, count: int) -> None:
     known = isinstance(values, Sequence | np.ndarray) and np.ndim(values) == 1 and len(values) == count
     if not known or not all(map(_is_number, values)):
         raise InvalidInputError(
-            f"{name} must be {count} finite numbers of less than {LARGEST:g}, got {brief(values)}: give them"
+            f"{name} must be {count} finite numbers of less than {LARGEST:g}, got {brief(values)}"
         )
 
 
@@ -369,8 +362,5 @@ def unit_vector(name: str, value: GivenVector, dim: int) -> GivenVector:
     """Return a direction at unit length."""
     length = float(np.linalg.norm(value)) if len(value) == dim else 0.0
     if not (np.isfinite(length) and length > 0):
-        raise InvalidInputError(
-            f"{name} must be {dim} finite numbers, not all zero, got {value!r}: for a floor in space give "
-            "(0, 0, 1)"
-        )
+        raise InvalidInputError(f"{name} must be {dim} finite numbers, not all zero, got {value!r}")
     return floats(np.asarray(value) / length)

@@ -34,9 +34,8 @@ def write_whole(path: Path, content: bytes) -> None:
     except OSError as error:
         before = "the one before is as it was" if path.exists() else "there is none yet"
         raise CheckpointError(
-            f"a checkpoint needs {len(content)} bytes in {str(path.parent)!r}, but {path.name!r} could not "
-            f"be written: {error.strerror or error} ({before}). Free space, make the folder writable and let "
-            "only one run write to this name; run again, and it goes on from the last whole checkpoint"
+            f"{len(content)} bytes of {path.name!r} in {str(path.parent)!r} could not be written: "
+            f"{error.strerror or error} ({before}): free space, let one run write, and run again to go on"
         ) from error
 
 

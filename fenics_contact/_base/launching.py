@@ -79,8 +79,7 @@ def launcher(ranks: int) -> list[str]:
     candidates = [str(path) for path in beside if os.access(path, os.X_OK)] or [shutil.which("mpirun") or ""]
     if not candidates[0]:
         raise MissingRequirementError(
-            f"{ranks} ranks need mpirun, found none beside {sys.executable} or on PATH: install the MPI of "
-            "its mpi4py, or take one rank",
+            f"{ranks} ranks need mpirun, found none: install MPI, or use one rank",
             name="mpirun",
         )
     return [candidates[0], "-n", str(ranks)]

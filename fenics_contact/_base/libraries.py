@@ -81,9 +81,8 @@ def check_not_forked() -> None:
     """Raise where libraries would wait for threads that exist in another process."""
     if _forked:
         raise ForkedProcessError(
-            "computing needs a process that starts its libraries itself, this one was forked from one that "
-            "had computed and would wait for ever for threads that are not here: start processes anew, with "
-            "multiprocessing.get_context('spawn') or mpirun, or fork them before anything is computed"
+            "computing needs a process that starts its libraries itself, this one was forked after "
+            "computing: start it by multiprocessing.get_context('spawn') or mpirun"
         )
 
 

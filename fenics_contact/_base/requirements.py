@@ -180,7 +180,7 @@ def require_extra(use: str, extra: str, *modules: str) -> None:
     for module in modules:
         if importlib.util.find_spec(module) is None:
             raise MissingRequirementError(
-                f"{use} need {module}, found none: pip install 'fenics_contact[{extra}]'", name=module
+                f"{use} need {module}: pip install 'fenics_contact[{extra}]'", name=module
             )
 
 
@@ -280,9 +280,7 @@ def check_compiler() -> None:
     problem = compiler_problem()
     if problem:
         raise MissingRequirementError(
-            f"fenics_contact needs a C compiler and Python's headers, as FEniCSx compiles forms, found: "
-            f"{problem}. Debian: {_APT} gcc libc6-dev python3-dev; conda-forge: conda install -c conda-forge "
-            "c-compiler",
+            f"forms need a C compiler and Python's headers: {problem}. {_APT} gcc python3-dev",
             name="compiler",
         )
 

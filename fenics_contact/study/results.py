@@ -126,12 +126,10 @@ def read_study(folder: str | Path) -> Results:
         )
         return Results(scene, int(data["ranks"]), runs, Parameters(**data["base"]), data["versions"])
     except FileNotFoundError:
-        raise InvalidInputError(
-            f"a study's results are in {path}, which does not exist: run the study first"
-        ) from None
+        raise InvalidInputError(f"{path} does not exist: run the study first") from None
     except (ValueError, KeyError, TypeError) as reason:
         raise InvalidInputError(
-            f"{path} must hold the results of a study, got {reason!r} on reading it: run the study again"
+            f"{path} must hold a study, got {reason!r} on reading it: run it again"
         ) from reason
 
 

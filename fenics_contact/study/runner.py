@@ -229,8 +229,7 @@ def summarised(name: str, records: Sequence[Record]) -> Record:
         for record in records[1:]:
             if key in record and record[key] != first.get(key):
                 raise ValueError(
-                    f"{key} of {name} must be equal in all repetitions, got {first.get(key)} and "
-                    f"{record[key]}: find out what is not deterministic"
+                    f"{key} of {name} must be equal in all repetitions, got {first.get(key)}, {record[key]}"
                 )
     result = dict(first)
     for key, value in first.items():

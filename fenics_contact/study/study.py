@@ -243,9 +243,7 @@ class StudyScene:
         if len(set(names)) < len(names):
             raise InvalidInputError(f"quantities must have different names, got {names}: rename one")
         if not self.name.replace("_", "").isalnum():
-            raise InvalidInputError(
-                f"the name of a study is part of file names, got {self.name!r}: use letters, digits and _"
-            )
+            raise InvalidInputError(f"a study's name must be of letters, digits and _, got {self.name!r}")
 
     @property
     def facts(self) -> SceneFacts:

@@ -88,7 +88,7 @@ def test_a_spoilt_byte_is_noticed_wherever_it_matters(path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(b"", "0 bytes;"), (b"no archive\n", "move it away to start over")],
+    [(b"", "0 bytes;"), (b"no archive\n", "restore or remove it")],
 )
 def test_a_file_of_another_kind_is_refused(path: Path, content: bytes, message: str) -> None:
     path.write_bytes(content)
@@ -98,7 +98,7 @@ def test_a_file_of_another_kind_is_refused(path: Path, content: bytes, message: 
 
 def test_arrays_of_another_program_are_refused(path: Path) -> None:
     np.savez(path, **ARRAYS)
-    with pytest.raises(InvalidInputError, match=r"run.npz' is another file: give the path of a check"):
+    with pytest.raises(InvalidInputError, match=r"run.npz' is another file: give a checkpoint"):
         read_archive(path, "test", PROBLEM)
 
 
@@ -112,12 +112,12 @@ def test_another_version_is_refused(path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(archive, "VERSION", 3)
     write_archive(path, "test", PROBLEM, ARRAYS)
     monkeypatch.undo()
-    with pytest.raises(InvalidInputError, match=r"version 2 is needed, .* is of version 3: go on"):
+    with pytest.raises(InvalidInputError, match=r"has version 3, not 2: use that release"):
         read_archive(path, "test", PROBLEM)
 
 
 def test_another_kind_is_refused(path: Path) -> None:
-    with pytest.raises(InvalidInputError, match=r"of a load history is needed, .* is one of a test"):
+    with pytest.raises(InvalidInputError, match=r"must be of a load history, is of a test"):
         read_archive(path, "load history", PROBLEM)
 
 
@@ -125,7 +125,7 @@ def test_another_problem_is_refused_and_what_differs_is_named(path: Path) -> Non
     other = {"size": "3", "bounds": "another box", "solver": "new"}
     with pytest.raises(
         InvalidInputError,
-        match=r"differ bounds \(a box, another box\); solver \(absent, new\): give",
+        match=r"differs \(there, here\) in bounds \(a box, another box\); solver \(absent, new\): give",
     ):
         read_archive(path, "test", other)
 
@@ -136,7 +136,7 @@ def test_what_to_do_with_a_file_that_is_there_is_the_callers_choice(path: Path) 
     assert Checkpoint(path, resume=False).read("test", PROBLEM, None) is None
     path.unlink()
     assert Checkpoint(path).read("test", PROBLEM, None) is None
-    with pytest.raises(InvalidInputError, match=r"cannot be read: No such file.*give the path of one"):
+    with pytest.raises(InvalidInputError, match=r"cannot be read: No such file.*give one that can"):
         Checkpoint(path, resume=True).read("test", PROBLEM, None)
 
 

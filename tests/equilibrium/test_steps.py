@@ -264,7 +264,7 @@ def test_other_steps_are_refused(interrupted: Path) -> None:
 
 def test_another_scene_is_refused(interrupted: Path) -> None:
     other = replace(sequence(None, MPI.COMM_SELF).scene, contacts=[])
-    with pytest.raises(InvalidInputError, match=r"scene.contacts.*more: give the same problem to go on"):
+    with pytest.raises(InvalidInputError, match=r"scene.contacts.*more: give the same problem or a new name"):
         LoadSequence(ContactProblem(other, MPI.COMM_SELF), checkpoint=Checkpoint(interrupted))
 
 
@@ -296,7 +296,7 @@ def test_a_body_without_contact_is_solved_again(tmp_path: Path) -> None:
 
 def test_an_unreadable_checkpoint_is_refused(interrupted: Path) -> None:
     shutil.copy(Path(__file__), interrupted)
-    with pytest.raises(InvalidInputError, match=r"is not a complete checkpoint .* move it away"):
+    with pytest.raises(InvalidInputError, match=r"is not a complete checkpoint .* restore or remove it"):
         sequence(Checkpoint(interrupted), MPI.COMM_SELF)
 
 

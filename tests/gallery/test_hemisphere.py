@@ -115,7 +115,7 @@ def test_the_grading_can_be_left_out() -> None:
     [
         ({"radius": 0.0}, "radius must be positive, got 0.0"),
         ({"n": 1}, "n must be an integer of at least 2, got 1"),
-        ({"grading": -1.0}, "grading must lie between 0 and 8, got -1.0"),
+        ({"grading": -1.0}, "grading must be from 0 to 8, got -1.0"),
         ({"symmetry": "y"}, "symmetry must be one of .*, got 'y'"),
     ],
 )

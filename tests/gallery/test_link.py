@@ -188,9 +188,9 @@ def test_the_same_shape_gives_the_same_mesh_bit_for_bit(small: Link) -> None:
         ({"cell": "wedge"}, "cell must be one of .*, got 'wedge'"),
         ({"inner_radius": 0.0}, "inner_radius must be positive, got 0.0"),
         ({"straight": -1.0}, "straight must be positive, got -1.0"),
-        ({"straight": np.nan}, "straight must be a finite number of less than"),
+        ({"straight": np.nan}, "straight must be a finite number below"),
         ({"thickness": -2.0}, "thickness and width must be positive, got -2.0 and 16.0"),
-        ({"width": np.inf}, "width must be a finite number of less than"),
+        ({"width": np.inf}, "width must be a finite number below"),
         (
             {"roundness": 1.0},
             "roundness must lie between 0 and 1, got 1.0",
@@ -370,7 +370,7 @@ def test_graded_links_touch_in_pairs_and_in_chains() -> None:
 
 @pytest.mark.parametrize("grading", [-0.1, 8.1])
 def test_a_grading_out_of_bounds_is_refused(grading: float) -> None:
-    with pytest.raises(InvalidInputError, match=f"grading must lie between 0 and 8, got {grading}"):
+    with pytest.raises(InvalidInputError, match=f"grading must be from 0 to 8, got {grading}"):
         LinkShape(grading=grading)
 
 
@@ -465,7 +465,7 @@ def test_a_start_that_penetrates_is_refused(build: Callable[..., object]) -> Non
 
 
 def test_a_gap_that_is_no_number_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match=r"gap must be a finite number of less than .*, got nan"):
+    with pytest.raises(InvalidInputError, match=r"gap must be a finite number below .*, got nan"):
         two_links(gap=np.nan)
 
 

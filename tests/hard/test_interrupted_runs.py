@@ -110,7 +110,7 @@ def test_a_full_disk_leaves_the_last_checkpoint_and_no_litter(tmp_path: Path, re
     assert found["failed"] > 3
     assert found["kept"] == found["failed"] - 1
     assert found["others"] == []
-    assert "Free space" in str(found["said"])
+    assert "free space" in str(found["said"])
     said = str(found["said"]).partition("could not be written: ")[2].partition(" (")[0]
     record(
         GROUP,

@@ -32,7 +32,7 @@ def test_what_a_call_leaves_is_found_by_the_next_and_not_here() -> None:
 
 
 def test_a_crash_is_an_error_with_its_signal_and_what_to_do() -> None:
-    words = r"^reading must come to an end, but the process crashed \(signal 11, .*\): read another$"
+    words = r"^reading must end, but the process crashed \(signal 11, .*\): read another$"
     with own_process() as process, pytest.raises(InvalidInputError, match=words):
         process.call(signal.raise_signal, signal.SIGSEGV)
 

@@ -76,7 +76,7 @@ def test_a_file_that_crashes_gmsh_is_refused_on_all_ranks(
     """
     answers = mpirun(script, ranks).splitlines()
     assert len(answers) == ranks
-    words = r"gmsh's reading of file '.*f\.msh' must come to an end, but the process crashed \(signal 11,"
+    words = r"gmsh's reading of file '.*f\.msh' must end, but the process crashed \(signal 11,"
     assert all(re.match(words, answer) for answer in answers)
 
 

@@ -146,7 +146,7 @@ def test_obstacles_are_recognised_by_their_members() -> None:
         (lambda: RigidPlane((0.0, np.nan), (0.0, 1.0)), "RigidPlane must be placed by 2 or 3 finite numbers"),
         (
             lambda: RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-            r"^RigidPlane.normal must be 3 finite numbers, not all zero, got \(0.0, 0.0, 0.0\): for a floor",
+            r"^RigidPlane.normal must be 3 finite numbers, not all zero, got \(0.0, 0.0, 0.0\)",
         ),
         (lambda: RigidPlane((0.0, 0.0), (0.0, 0.0, 1.0)), "RigidPlane.normal must be 2 finite numbers"),
         (lambda: RigidSphere((0.0, np.inf), 1.0), "RigidSphere must be placed by 2 or 3 finite numbers"),

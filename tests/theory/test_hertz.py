@@ -117,7 +117,7 @@ def test_relative_curvatures_add_and_turn() -> None:
         (hertz_point, (1.0, (1, -1), 1), r"curvatures\[0\] must be positive, got -1"),
         (hertz_point, (1.0, (1, 1), None), "modulus must be a finite number, got None"),
         (hertz_point, (1.0, (1,), 1), "curvatures must be two relative curvatures, got 1"),
-        (hertz_point, (1.0, (1e-13, 1), 1), "must differ by less than a factor of 1e"),
+        (hertz_point, (1.0, (1e-13, 1), 1), "must differ by less than 1e"),
         (hertz_line, (1.0, np.nan, 1), "curvature must be a finite number, got nan"),
         (contact_modulus, (1.0, 0.3, 0.0, 0.3), "young_2 must be positive, got 0.0"),
         (contact_modulus, (1.0, 0.6, 1.0, 0.3), "poisson_1 must lie between -1 and 1/2, got 0.6"),
@@ -185,8 +185,8 @@ def test_a_pin_without_clearance_touches_on_one_arc_whatever_its_load() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"clearance": -0.1}, "clearance must lie between 0 and a tenth of the radius 10.0, got -0.1"),
-        ({"clearance": 2.0}, "got 2.0: take hertz_line for a loose pin"),
+        ({"clearance": -0.1}, "clearance must lie between 0 and 1, got -0.1"),
+        ({"clearance": 2.0}, "got 2.0: use hertz_line"),
         ({"force": -1.0}, "force must be positive, got -1.0"),
         ({"radius": np.inf}, "radius must be a finite number, got inf"),
     ],
@@ -225,7 +225,7 @@ def test_it_is_an_integral_over_the_half_space(place: float) -> None:
 
 
 def test_places_beyond_the_ends_are_refused() -> None:
-    with pytest.raises(InvalidInputError, match=r"within half the length, 1, from the middle .*, got 1\.5"):
+    with pytest.raises(InvalidInputError, match=r"position must be within 1 of the middle, got 1\.5"):
         roller_relief(np.array([0.0, 1.5]), 2.0)
     with pytest.raises(InvalidInputError, match="half_width"):
         roller_relief(np.array([0.0]), 2.0, 0.0)

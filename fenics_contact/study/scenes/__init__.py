@@ -19,8 +19,7 @@ def find_study(name: str) -> StudyScene:
         return _checked(getattr(run_file(Path(name)), "study", None), name)
     if name not in BUILT_IN:
         raise InvalidInputError(
-            f"a study is one of {list(BUILT_IN)} or a Python file, got {name!r}: use one of the names, or "
-            "the path of a file that ends in '.py' and defines `study`"
+            f"a study is one of {list(BUILT_IN)} or a Python file that defines `study`, got {name!r}"
         )
     module = importlib.import_module(f"{__name__}.{name}")
     return _checked(getattr(module, "study", None), name)
@@ -34,7 +33,6 @@ def scene_file(name: str) -> Path | None:
 def _checked(study: object, name: str) -> StudyScene:
     if not isinstance(study, StudyScene):
         raise InvalidInputError(
-            f"{name!r} must define `study`, a StudyScene, got {type(study).__name__}: see "
-            "fenics_contact/study/scenes/hertz.py for an example"
+            f"{name!r} must define `study`, a StudyScene, got {type(study).__name__}: see study/scenes"
         )
     return study
