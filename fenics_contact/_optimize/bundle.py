@@ -222,8 +222,7 @@ def solve(program: QuadraticProgram) -> QuadraticSolution:
         statuses.append(str(answer.status))
         if answer.status in _INFEASIBLE:
             raise InvalidInputError(
-                "the bounds and linear constraints must leave at least one point, but Clarabel reports "
-                f"{answer.status}: remove or relax the rows that contradict each other"
+                f"bounds and linear constraints leave no point (Clarabel: {answer.status}): relax some"
             )
         if answer.status == clarabel.SolverStatus.Solved:
             return _solution(program, answer, exact=True)
@@ -231,8 +230,7 @@ def solve(program: QuadraticProgram) -> QuadraticSolution:
             almost = answer
     if almost is None:
         raise SubproblemError(
-            f"Clarabel must solve the quadratic programme of a step, but reported {', '.join(statuses)}: "
-            "rescale the variables with `scale`, or look for subgradients of very different size"
+            f"Clarabel reported {', '.join(statuses)} for a quadratic programme: rescale by `scale`"
         )
     return _solution(program, almost, exact=False)
 

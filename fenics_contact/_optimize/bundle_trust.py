@@ -80,10 +80,7 @@ def _refuse(constraints: tuple[NonlinearConstraint, ...], values: list[float], f
         if violation > feasibility
     ]
     if words:
-        raise InvalidInputError(
-            f"x0 must meet the nonlinear constraints, but {'; '.join(words)}: start from a feasible point, "
-            "or let the method restore it with restore=True"
-        )
+        raise InvalidInputError(f"x0 must meet nonlinear constraints, {'; '.join(words)}: or restore=True")
 
 
 @dataclass(frozen=True)
@@ -241,8 +238,7 @@ class BundleTrust:
             raise InvalidInputError(f"descent must lie in (0, 1), got {self.descent}")
         if not 0.0 < self.inexactness < 0.5 * self.descent:
             raise InvalidInputError(
-                f"inexactness must lie between 0 and half of descent, {0.5 * self.descent}, got "
-                f"{self.inexactness}: else the error could be taken for a descent"
+                f"inexactness must be in [0, {0.5 * self.descent}], got {self.inexactness}"
             )
         if not 0.0 <= self.locality < np.inf:
             raise InvalidInputError(f"locality must not be negative (0 for a convex J), got {self.locality}")

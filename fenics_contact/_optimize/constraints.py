@@ -253,14 +253,9 @@ def _of_scipy(given: Any, n: int) -> LinearConstraints:
     matrix = np.atleast_2d(np.asarray(dense, dtype=float))
     low, high = (np.broadcast_to(np.asarray(side, dtype=float), len(matrix)) for side in (given.lb, given.ub))
     if matrix.shape[1] != n:
-        raise InvalidInputError(
-            f"a LinearConstraint must have a matrix of {n} columns, one for each variable, got shape "
-            f"{matrix.shape}"
-        )
+        raise InvalidInputError(f"a LinearConstraint needs a matrix of {n} columns, got shape {matrix.shape}")
     if np.isnan(low).any() or np.isnan(high).any() or (low > high).any():
-        raise InvalidInputError(
-            f"a LinearConstraint must have lb <= ub in every row, got lb {low} and ub {high}: exchange them"
-        )
+        raise InvalidInputError(f"a LinearConstraint must have lb <= ub, got lb {low} and ub {high}")
     equal = low == high
     above, below = np.isfinite(high) & ~equal, np.isfinite(low) & ~equal
     rows, limits = np.vstack([matrix[above], -matrix[below]]), np.concatenate([high[above], -low[below]])
@@ -300,19 +295,14 @@ def _box(n: int, bounds: Box | None) -> tuple[Array, Array]:
     crossed = np.flatnonzero(lower > upper)
     if crossed.size:
         k = crossed[0]
-        raise InvalidInputError(
-            f"lower bounds must not exceed upper ones, got {lower[k]:.6g} > {upper[k]:.6g} for x[{k}]"
-        )
+        raise InvalidInputError(f"lower must be <= upper, got {lower[k]:.6g} > {upper[k]:.6g} for x[{k}]")
     return lower, upper
 
 
 def _rows(n: int, matrix: ArrayLike, limit: ArrayLike, name: str, right: str) -> tuple[Array, Array]:
     a, b = _frozen(matrix, name, 2), _frozen(limit, right, 1)
     if a.shape != (b.size, n):
-        raise InvalidInputError(
-            f"{name} must have shape ({b.size}, {n}): a row for each entry of {right}, a column for each "
-            f"variable; got {a.shape}"
-        )
+        raise InvalidInputError(f"{name} must have shape ({b.size}, {n}) to match {right}, got {a.shape}")
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         raise InvalidInputError(f"{name} and {right} must be finite: leave out the rows that bind nothing")
     return a, b

@@ -107,10 +107,7 @@ def smallest_radius(design: Net, axis: int, radius: float, points: Array) -> Lin
     rows, curvature = _bending(design, axis, points, "of a smallest radius")
     sharpest = float(np.abs(curvature).max(initial=0.0))
     if sharpest > (1.0 + 1e-9) / radius:
-        raise InvalidInputError(
-            f"the smallest radius must not exceed those of the reference, got {radius:.6g} for one of "
-            f"{1.0 / sharpest:.6g}: give a smaller one"
-        )
+        raise InvalidInputError(f"the smallest radius must not exceed {1.0 / sharpest:.6g}, got {radius:.6g}")
     limit = np.concatenate([curvature + 1.0 / radius, 1.0 / radius - curvature])
     return LinearConstraints(np.vstack([rows, -rows]), limit)
 
@@ -131,10 +128,7 @@ def fixed_rim(design: Net, width: int | Sequence[int] = 1) -> LinearConstraints:
     widths = (width,) * len(counts) if isinstance(width, int) else tuple(width)
     fits = len(widths) == len(counts) and min(widths) >= 0 and max(widths) > 0
     if not fits or any(count <= 2 * held for count, held in zip(counts, widths, strict=True)):
-        raise InvalidInputError(
-            f"a rim of {width} control points must leave some of a net of {counts} inside: take a finer net "
-            "or a narrower rim, at least 1"
-        )
+        raise InvalidInputError(f"a rim of {width} must be at least 1 and leave some of a net of {counts}")
     inner = np.zeros(counts, dtype=bool)
     inner[tuple(slice(held, count - held) for count, held in zip(counts, widths, strict=True))] = True
     held = np.flatnonzero(~inner)
@@ -159,8 +153,7 @@ def joined(designs: Sequence[Net], *parts: tuple[int, LinearConstraints]) -> Lin
             given, first, last = np.asarray(matrix, dtype=float), ends[number], ends[number + 1]
             if given.ndim != 2 or given.shape[1] != last - first:
                 raise InvalidInputError(
-                    f"constraints of design {number} must have {last - first} columns, one for each of its "
-                    f"variables, got shape {given.shape}"
+                    f"constraints of design {number} must have {last - first} columns, got {given.shape}"
                 )
             matrices[kind].append(np.pad(given, ((0, 0), (first, ends[-1] - last))))
             limits[kind].append(np.asarray(limit, dtype=float))
@@ -174,9 +167,7 @@ def _lines(design: Net, axis: int, least: int, what: str) -> NDArray[np.intp]:
     if axis not in range(len(counts)):
         raise InvalidInputError(f"axis must be one of the {len(counts)} parameters of the net, got {axis!r}")
     if counts[axis] < least:
-        raise InvalidInputError(
-            f"a {what} profile needs at least {least} control points along it, got {counts[axis]}"
-        )
+        raise InvalidInputError(f"a {what} profile needs {least} or more control points, got {counts[axis]}")
     numbers = np.moveaxis(np.arange(np.prod(counts, dtype=int)).reshape(counts), axis, 0)
     return numbers.reshape(counts[axis], -1)
 

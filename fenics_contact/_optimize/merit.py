@@ -272,8 +272,7 @@ def restored(
     if least.violation > feasibility:
         worst = int(np.argmax(least.violations))
         raise InvalidDesignError(
-            f"no design near it meets {constraints[worst].name}: the nearest one found misses it by "
-            f"{least.violation:.2g} of its size"
+            f"no design near it meets {constraints[worst].name}, the best misses it by {least.violation:.2g}"
         )
     return best
 

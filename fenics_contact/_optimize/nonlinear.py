@@ -55,18 +55,12 @@ class NonlinearConstraint:
         """Reject limits that leave nothing, or everything."""
         if not callable(self.fun):
             raise InvalidInputError(
-                f"a NonlinearConstraint needs a function x -> (value, subgradient), got "
-                f"{type(self.fun).__name__}: give such a function and then its limits"
+                f"a NonlinearConstraint needs x -> (value, subgradient), got {type(self.fun).__name__}"
             )
         if np.isnan(self.lower) or np.isnan(self.upper) or self.lower > self.upper:
-            raise InvalidInputError(
-                f"a NonlinearConstraint must have lower <= upper, got {self.lower} and {self.upper}"
-            )
+            raise InvalidInputError(f"lower must not exceed upper, got {self.lower} and {self.upper}")
         if not np.isfinite([self.lower, self.upper]).any():
-            raise InvalidInputError(
-                f"a NonlinearConstraint needs a finite limit, got {self.lower} and {self.upper}: give upper, "
-                "lower or both"
-            )
+            raise InvalidInputError(f"a finite upper or lower is needed, got {self.lower} and {self.upper}")
         if self.scale is not None and not 0.0 < self.scale < np.inf:
             raise InvalidInputError(f"scale of a constraint must be positive and finite, got {self.scale}")
 
@@ -111,15 +105,11 @@ def _components(given: Any, start: Array) -> list[NonlinearConstraint]:
     """Return the components of a `scipy.optimize.NonlinearConstraint`, whose function exists at ``start``."""
     if not callable(given.jac):
         raise InvalidInputError(
-            f"a NonlinearConstraint must have its derivative as the function jac, got {given.jac!r}: give "
-            "it, or fenics_contact.design.NonlinearConstraint with a function x -> (value, subgradient)"
+            f"jac must be a function (the derivative), got {given.jac!r}: or use design.NonlinearConstraint"
         )
     values = np.atleast_1d(np.asarray(given.fun(start.copy()), dtype=float))
     if np.size(given.lb) not in (1, values.size) or np.size(given.ub) not in (1, values.size):
-        raise InvalidInputError(
-            f"a NonlinearConstraint with {values.size} components must have as many limits, or one for all, "
-            f"got lb {given.lb} and ub {given.ub}"
-        )
+        raise InvalidInputError(f"{values.size} components need as many limits, got {given.lb}, {given.ub}")
     low, high = (
         np.broadcast_to(np.asarray(side, dtype=float), values.shape) for side in (given.lb, given.ub)
     )

@@ -154,8 +154,7 @@ def _with_pieces(fun: MaxFunction, evaluation: Evaluation, where: str) -> Evalua
     values, slopes = (np.array(part, dtype=float) for part in given)
     if values.ndim != 1 or slopes.shape != (values.size, evaluation.x.size):
         raise InvalidInputError(
-            f"pieces must return values (k,) and subgradients (k, {evaluation.x.size}), got shapes "
-            f"{values.shape} and {slopes.shape} {where}"
+            f"pieces must return (k,), (k, {evaluation.x.size}), got {values.shape}, {slopes.shape} {where}"
         )
     require_finite("pieces must return finite values", values, where)
     require_finite("pieces must return finite subgradients", slopes, where)
@@ -188,8 +187,7 @@ def _checked(answer: Any, x: Array, where: str, name: str = "fun") -> Evaluation
     value, subgradient = np.array(answer[0], dtype=float), np.array(answer[1], dtype=float)
     if value.size != 1 or subgradient.shape != x.shape:
         raise InvalidInputError(
-            f"{name} must return a number and a subgradient of shape {x.shape}, got shapes {value.shape} and "
-            f"{subgradient.shape} {where}"
+            f"{name} needs a number and subgradient {x.shape}, got {value.shape}, {subgradient.shape} {where}"
         )
     require_finite(f"{name} must return a finite value", value, where)
     require_finite(f"{name} must return a finite subgradient", subgradient, where)
@@ -201,6 +199,5 @@ def require_finite(needed: str, numbers: Array, where: str) -> None:
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         raise InvalidInputError(
-            f"{needed}, got {numbers.ravel()[bad[0]]} in entry {bad[0]} {where}: raise InvalidDesignError "
-            "for a design that cannot be evaluated"
+            f"{needed}, got {numbers.ravel()[bad[0]]} in entry {bad[0]} {where}: or raise InvalidDesignError"
         )

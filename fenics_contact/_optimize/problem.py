@@ -132,8 +132,7 @@ def pose(
     if violations:
         more = f" and {len(violations) - 3} more" if len(violations) > 3 else ""
         raise InvalidInputError(
-            f"x0 must be feasible, but {'; '.join(violations[:3])}{more}: start from "
-            "nearest_feasible(x0, bounds, constraints)"
+            f"x0 must be feasible, but {'; '.join(violations[:3])}{more}: use nearest_feasible(x0, ...)"
         )
     start = allowed.clip(start)
     size = _scale(start.size, allowed, scale)

@@ -127,8 +127,7 @@ class ForScipy:
         candidates = [visit for visit in self.visits if not visit.note and visit.violation <= violation]
         if not candidates:
             raise InvalidInputError(
-                f"none of {len(self.visits)} designs that were evaluated is feasible within {violation:g}: "
-                "let the method run, or allow more with best_within(violation)"
+                f"no design of {len(self.visits)} is feasible within {violation:g}: use best_within"
             )
         return min(candidates, key=lambda visit: visit.value)
 
@@ -154,10 +153,7 @@ class ForScipy:
         name, allowed = method.lower(), self._problem.allowed
         rows = len(allowed.matrix) + len(allowed.equality_matrix) + len(self._nonlinear)
         if rows and name not in _CONSTRAINED:
-            raise InvalidInputError(
-                f"a problem with constraints needs a method that keeps them, got {method!r}: use "
-                "SLSQP, trust-constr or COBYLA"
-            )
+            raise InvalidInputError(f"constraints need SLSQP, trust-constr or COBYLA, got {method!r}")
         arguments: dict[str, Any] = {"x0": self._problem.start / self._problem.scale, "method": method}
         if name in _WITHOUT_DERIVATIVE:
             arguments["fun"] = self.value_alone

@@ -206,10 +206,7 @@ class CoarseSpace:
         self.matrix: Any = G if isinstance(G, Composed) else sp.csr_matrix(G, dtype=np.float64)
         self.load = np.asarray(e, dtype=np.float64)
         if self.load.shape != (self.matrix.shape[0],):
-            raise InvalidInputError(
-                f"e must have shape ({self.matrix.shape[0]},) like the rows of G, got {self.load.shape}: "
-                "assemble both from the same list of floating subdomains"
-            )
+            raise InvalidInputError(f"e must have {self.matrix.shape[0]} entries as G, got {self.load.shape}")
         self._transposed = self.matrix.T  # shares its memory
         self._gram, self.eliminate = gram, eliminate
         self._reduced: list[FaceGrams | None] = []  # one at most, shared by all loads

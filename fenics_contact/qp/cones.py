@@ -40,14 +40,10 @@ class FeasibleSet:
         """Check the slip bound."""
         expected = (self.layout.n_friction,)
         if np.shape(self.slip_bound) != expected:
-            raise InvalidInputError(
-                f"slip_bound must have shape {expected}, got {np.shape(self.slip_bound)}: "
-                "give one nodal force per friction disc"
-            )
+            raise InvalidInputError(f"slip_bound must have shape {expected}, got {np.shape(self.slip_bound)}")
         if not np.all((self.slip_bound >= 0) & np.isfinite(self.slip_bound)):
             raise InvalidInputError(
-                f"slip_bound must be finite and not negative, got {np.min(self.slip_bound)} to "
-                f"{np.max(self.slip_bound)}: check the friction coefficient and the normal forces"
+                f"slip_bound must be in [0, ∞), got {np.min(self.slip_bound)} to {np.max(self.slip_bound)}"
             )
 
     def project(self, x: Vector) -> Vector:
@@ -333,14 +329,10 @@ class CoulombLaw:
         expected = (self.layout.n_friction,)
         coefficient = np.asarray(self.strength.coefficient)
         if coefficient.shape != expected:
-            raise InvalidInputError(
-                f"friction_coefficient must have shape {expected}, got {coefficient.shape}: "
-                "give one coefficient per friction disc"
-            )
+            raise InvalidInputError(f"friction_coefficient needs shape {expected}, got {coefficient.shape}")
         if not np.all((coefficient >= 0) & np.isfinite(coefficient)):
             raise InvalidInputError(
-                "friction_coefficient must be finite and not negative, got "
-                f"{coefficient.min()} to {coefficient.max()}"
+                f"friction_coefficient must be in [0, ∞), got {coefficient.min()} to {coefficient.max()}"
             )
         given = np.asarray(self.given, dtype=np.float64)
         FeasibleSet(self.layout, given if given.ndim else np.full(expected, float(given)))

@@ -102,10 +102,8 @@ class FrictionAlone:
         equilibrium = self._under(self.wedged * self.problem.law.bound(self._forces))
         if equilibrium.motion is not None:
             raise InfeasibleError(
-                "friction needs surfaces that are pressed together, but without it they are pressed so "
-                f"little that even {self.wedged:g} times the forces that it may then carry leave "
-                f"{100 * equilibrium.error:.2g} % of the load unbalanced: support bodies that only friction "
-                "holds, or press them"
+                "friction needs surfaces that are pressed together, without friction even "
+                f"{self.wedged:g} times the forces leave {100 * equilibrium.error:.2g} % of it: press them"
             )
 
     def require_enough_sliding(self, start: Vector | None, settled: float = 1e-2, times: int = 20) -> None:
@@ -550,10 +548,7 @@ class ProjectedCG:
         """
         contacts = round(float(global_sum(problem.comm, problem.layout.n_contact)[0]))
         if contacts:
-            raise InvalidInputError(
-                f"projected CG needs a problem without contact, got {contacts} contacts: use FaceNewton or "
-                "Smalse"
-            )
+            raise InvalidInputError(f"projected CG needs no contact, got {contacts}: use FaceNewton")
         newton = FaceNewton(
             tolerance=self.tolerance,
             max_products=self.max_products,

@@ -168,8 +168,7 @@ class FixedPoint:
             except ConvergenceError as failure:
                 steps = continued(history, failure.history, products)
                 raise StoppedError(
-                    f"the Coulomb fixed point needs residuals below {self.tolerance:.1e}, but its Tresca "
-                    f"problem {number} failed: {failure}",
+                    f"the Coulomb fixed point needs {self.tolerance:.1e}, Tresca problem {number}: {failure}",
                     steps,
                     best or start.iterate,
                 ) from failure

@@ -54,28 +54,23 @@ class ContactLayout:
         """Check shapes, ranges and that no entry is used twice."""
         if self.normal.ndim != 1 or self.tangential.ndim != 2 or self.tangential.shape[1] not in (1, 2):
             raise InvalidInputError(
-                "a layout needs normal of shape (n_contact,) and tangential of shape (n_friction, 1 or 2), "
-                f"got {self.normal.shape} and {self.tangential.shape}: give one row per friction disc"
+                f"give normal (n,), tangential (m, 1 or 2), got {self.normal.shape}, {self.tangential.shape}"
             )
         if self.friction_of.shape != (len(self.tangential),):
             raise InvalidInputError(
-                f"friction_of must have shape ({len(self.tangential)},), got {self.friction_of.shape}: "
-                "name the contact of every friction disc"
+                f"friction_of must have shape ({len(self.tangential)},), got {self.friction_of.shape}"
             )
         used = np.concatenate([self.normal, self.tangential.ravel()])
         if used.size and (used.min() < 0 or used.max() >= self.size or np.unique(used).size < used.size):
             raise InvalidInputError(
-                f"contact positions must be distinct and lie in 0..{self.size - 1}, got "
-                f"{used.size} positions, {np.unique(used).size} distinct, from {used.min()} to {used.max()}"
+                f"contact positions must be distinct and lie in 0..{self.size - 1}, got {used.size} "
+                f"positions, {np.unique(used).size} distinct, from {used.min()} to {used.max()}"
             )
         owners = self.friction_of
         if owners.size and (
             owners.min() < 0 or owners.max() >= self.n_contact or np.unique(owners).size < owners.size
         ):
-            raise InvalidInputError(
-                f"friction_of must name distinct contacts in 0..{self.n_contact - 1}, got {owners}: "
-                "a contact carries at most one friction disc"
-            )
+            raise InvalidInputError(f"friction_of must name distinct contacts, got {owners}")
 
     @property
     def n_contact(self) -> int:

@@ -197,8 +197,7 @@ class DualProblem:
             _require_finite("e", self.coarse.load)
             if not np.all(self.diagonal[self.layout.contact] > 0):
                 raise InvalidInputError(
-                    "diagonal must be positive on every contact row, got "
-                    f"{self.diagonal[self.layout.contact].min()}: estimate it by the flexibility of the rows"
+                    f"diagonal must be positive on contact, got {self.diagonal[self.layout.contact].min()}"
                 )
             self._require_resisted_load()
 
@@ -208,8 +207,7 @@ class DualProblem:
         if np.abs(work).max(initial=0.0) > 1e-8 * size:
             worst = int(np.argmax(np.abs(work)))
             raise InfeasibleError(
-                "every loaded rigid motion needs a multiplier against it, but the load works "
-                f"{work[worst]:.3e} on row {worst} of e and no row of B resists: support or glue that body"
+                f"a rigid motion, row {worst} of e, has load {work[worst]:.3e} but no row of B: support it"
             )
 
 
@@ -360,14 +358,10 @@ class ShiftedOperator:
 
 def _require_shape(name: str, array: Vector, size: int) -> None:
     if array.shape[0] != size:
-        raise InvalidInputError(
-            f"{name} must have {size} entries like the layout's owned vector, got {array.shape[0]}"
-        )
+        raise InvalidInputError(f"{name} must have {size} entries as the layout owns, got {array.shape[0]}")
 
 
 def _require_finite(name: str, array: Vector) -> None:
     if not np.all(np.isfinite(array)):
         count = int(np.count_nonzero(~np.isfinite(array)))
-        raise InvalidInputError(
-            f"{name} must be finite, got {count} entries that are not: check loads, gaps and materials"
-        )
+        raise InvalidInputError(f"{name} must be finite, got {count} entries that are not: check loads, gaps")

@@ -293,20 +293,15 @@ class Smalse:
             ConvergenceError: The product budget was used up; carries the history.
         """
         if problem.compliance.gives_way:
-            raise InvalidInputError(
-                "SMALSE needs surfaces that do not give way, got closure laws or a stick stiffness: "
-                "use FaceNewton"
-            )
+            raise InvalidInputError("SMALSE needs no closure laws or stick stiffness: use FaceNewton")
         if problem.exact is not None and self.tolerance < self.rounded:
             raise InvalidInputError(
-                f"SMALSE needs products in double precision for residuals below {self.rounded:g}, got the "
-                f"tolerance {self.tolerance:g} with subdomains stored compactly, in single precision, to fit "
-                "into memory: use FaceNewton, which refines them, allow more memory, or loosen the tolerance"
+                f"SMALSE needs subdomains in double precision below a tolerance of {self.rounded:g}, got "
+                f"{self.tolerance:g} with compact ones: use FaceNewton, allow more memory, or loosen it"
             )
         if not isinstance(problem.law, TrescaLaw):
             raise InvalidInputError(
-                f"SMALSE needs a given slip bound, got {type(problem.law).__name__}: iterate on the "
-                "bound around it, or use FaceNewton"
+                f"SMALSE needs a given slip bound, got {type(problem.law).__name__}: use FaceNewton"
             )
         operator, history = start.operator, list[SolverStep]()
         for state in outer_iterations(problem, start, self):
@@ -321,8 +316,7 @@ class Smalse:
                 break
         answer = certify(problem, state.multiplier, operator.exactly(state.multiplier), state.residual)
         raise StoppedError(
-            f"SMALSE needs residuals below {self.tolerance:.1e}, got after {operator.products} products: "
-            f"{history[-1]}; raise max_products, or loosen the tolerance",
+            f"SMALSE needs residuals below {self.tolerance:.1e}, got {history[-1]}: raise max_products",
             history,
             answer.iterate,
         )

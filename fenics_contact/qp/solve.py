@@ -90,9 +90,8 @@ def require_equilibrium(problem: DualProblem) -> Equilibrium:
         size = np.abs(equilibrium.motion)
         rows = np.flatnonzero(size > 0.1 * size.max())
         raise InfeasibleError(
-            "contact and friction need to balance the load, but no admissible multiplier comes closer than "
-            f"{100 * equilibrium.error:.3g} % of it: the rigid motions in rows {rows.tolist()} of e are not "
-            "held; add a support, turn the load into the contact or raise the friction"
+            f"contact and friction must balance the load, but leave {100 * equilibrium.error:.3g} % of it: "
+            f"motions in rows {rows.tolist()} of e are not held; add a support, or raise the friction"
         )
     return equilibrium
 
@@ -290,8 +289,7 @@ def _solve_as_given(problem: DualProblem, solver: DualSolver, start: _Cold) -> D
         solution = _run(problem, solver, begin)
     if not solution.residuals.within(solver.tolerance):
         raise ConvergenceError(
-            f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals}: "
-            "the solver claims convergence that its own answer does not show",
+            f"the solver's answer must have residuals below {solver.tolerance:.1e}, got {solution.residuals}",
             solution.history,
         )
     return solution
@@ -339,8 +337,7 @@ def _solve_scaled(problem: DualProblem, solver: DualSolver, start: _Cold, attemp
         tolerance *= 0.3 * solver.tolerance / solution.residuals.worst
         tolerance = min(tolerance, 0.3 * found.residuals.worst or tolerance)  # else nothing is left to do
     raise ConvergenceError(
-        f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals} after "
-        f"{attempts} attempts with ever stricter scaled ones: loosen the tolerance",
+        f"residuals must be below {solver.tolerance:.1e}, got {solution.residuals} in {attempts} attempts",
         history,
     )
 
@@ -376,9 +373,7 @@ def _slip_law(
         return CoulombLaw(layout, Proportional(np.asarray(friction_coefficient, dtype=np.float64)), given)
     if slip_bound is None:
         if layout.n_friction:
-            raise InvalidInputError(
-                f"{layout.n_friction} friction discs need a slip_bound or a friction_coefficient, got neither"
-            )
+            raise InvalidInputError("friction discs need a slip_bound or friction_coefficient, got neither")
         slip_bound = np.zeros(0)
     law = TrescaLaw(layout, np.asarray(slip_bound, dtype=np.float64))
     law.feasible(np.zeros(layout.size))
@@ -427,7 +422,4 @@ def _as_it_is(problem: DualProblem, start: Start, tolerance: float) -> DualSolut
 
 def _require_size(multiplier: Vector, size: int) -> None:
     if multiplier.shape != (size,):
-        raise InvalidInputError(
-            f"start must have shape ({size},) like this rank's owned vector, got {multiplier.shape}: "
-            "start cold where the rows have changed"
-        )
+        raise InvalidInputError(f"start must have shape ({size},), got {multiplier.shape}: start cold")

@@ -368,7 +368,7 @@ def test_a_function_that_cannot_do_better_ends_with_what_it_has() -> None:
 
 @pytest.mark.parametrize("share", [0.0, 0.025, -1.0])
 def test_errors_that_could_pass_for_a_descent_are_refused(share: float) -> None:
-    with pytest.raises(InvalidInputError, match=r"inexactness must lie between 0 and half of descent, 0.025"):
+    with pytest.raises(InvalidInputError, match=r"inexactness must be in \[0, 0.025\], got"):
         BundleTrust(inexactness=share)
 
 
@@ -575,7 +575,7 @@ def bowl(x: np.ndarray) -> tuple[float, np.ndarray]:
         ({"bounds": (0.0, 1.0, 2.0)}, r"pair \(lower, upper\), got 3"),
         ({"bounds": (np.zeros(3), 1.0)}, r"lower bound must have shape \(2,\) like x0, got \(3,\)"),
         ({"bounds": (-5.0, [np.nan, 1.0])}, "upper bound must hold numbers, got nan"),
-        ({"bounds": ([0.0, 3.0], 2.0)}, r"lower bounds must not exceed.*3 > 2 for x\[1\]"),
+        ({"bounds": ([0.0, 3.0], 2.0)}, r"lower must be <= upper, got 3 > 2 for x\[1\]"),
         ({"bounds": (2.0, 9.0)}, r"x\[0\] = 1 is below its lower bound 2.*nearest_feasible"),
         ({"bounds": (-9.0, [9.0, 0.5])}, r"x\[1\] = 1 is above its upper bound 0.5"),
         ({"constraints": LinearConstraints(np.ones(2), np.ones(1))}, "A must have 2 dim"),
@@ -621,9 +621,12 @@ def test_many_violations_are_counted() -> None:
     ("answer", "text"),
     [
         (3.0, r"must return \(value, subgradient\), got float at evaluation 1"),
-        ((3.0, np.ones(3)), r"subgradient of shape \(2,\), got shapes \(\) and \(3,\)"),
-        ((np.ones(2), np.ones(2)), r"must return a number and.*got shapes \(2,\)"),
-        ((np.nan, np.ones(2)), "finite value, got nan in entry 0 at evaluation 1: raise InvalidDesignError"),
+        ((3.0, np.ones(3)), r"subgradient \(2,\), got \(\), \(3,\)"),
+        ((np.ones(2), np.ones(2)), r"needs a number and subgradient.*got \(2,\)"),
+        (
+            (np.nan, np.ones(2)),
+            "finite value, got nan in entry 0 at evaluation 1: or raise InvalidDesignError",
+        ),
         ((1.0, np.array([0.0, -np.inf])), "finite subgradient, got -inf in entry 1 at evaluation 1"),
     ],
 )

@@ -76,7 +76,7 @@ def test_feasible_point_is_its_own_projection() -> None:
 
 
 def test_contradicting_constraints_have_no_nearest_point() -> None:
-    with pytest.raises(InvalidInputError, match="must leave at least one point"):
+    with pytest.raises(InvalidInputError, match="leave no point"):
         nearest_feasible([0.0], (0.0, 1.0), LinearConstraints([[1.0]], [-1.0]))
 
 
@@ -444,20 +444,20 @@ def test_the_nearest_symmetric_convex_shape_is_found_by_minimising() -> None:
         (partial(monotone, DESIGN, 0, 2), "sign of a monotone displacement must be 1 or -1, got 2"),
         (
             partial(convex, SurfaceDesign("b", SURFACE, net=(2, 4)), 0),
-            "at least 3 control points along it, got 2",
+            "needs 3 or more control points, got 2",
         ),
         (
             partial(monotone, SurfaceDesign("b", SURFACE, net=(1, 4)), 0),
-            "at least 2 control points .*, got 1",
+            "needs 2 or more control points, got 1",
         ),
         (partial(smallest_radius, DESIGN, 0, 0.0, MESH.points), "radius must be positive and finite, got 0"),
         (
             lambda: smallest_radius(arc(2.0, True)[0], 0, 3.0, arc(2.0, True)[1]),
-            "must not exceed those of the reference, got 3 for one of 2: give",
+            "the smallest radius must not exceed 2, got 3",
         ),
-        (partial(fixed_rim, DESIGN, 2), r"a rim of 2 control points must leave some of a net of .* inside"),
-        (partial(fixed_rim, DESIGN, (0, 0)), r"a rim of \(0, 0\) control points must leave"),
-        (partial(fixed_rim, DESIGN, (1, 0, 0)), r"a rim of \(1, 0, 0\) control points must leave"),
+        (partial(fixed_rim, DESIGN, 2), r"a rim of 2 must be at least 1 and leave some of a net of"),
+        (partial(fixed_rim, DESIGN, (0, 0)), r"a rim of \(0, 0\) must be at least 1"),
+        (partial(fixed_rim, DESIGN, (1, 0, 0)), r"a rim of \(1, 0, 0\) must be at least 1"),
         (partial(joined, (DESIGN,), (1, symmetric(DESIGN, 0))), "there are 1 designs, got number 1"),
         (partial(joined, (CURVE,), (0, symmetric(DESIGN, 0))), r"design 0 must have 7 columns, .* \(0, 24\)"),
     ],
@@ -595,7 +595,7 @@ def test_multiplier_of_an_active_row_is_the_force_on_it() -> None:
 
 
 def test_contradicting_rows_are_reported() -> None:
-    with pytest.raises(InvalidInputError, match="PrimalInfeasible: remove or relax the rows"):
+    with pytest.raises(InvalidInputError, match=r"leave no point \(Clarabel: PrimalInfeasible\): relax"):
         solve(little_program([1.0, -2.0]))
 
 

@@ -122,12 +122,12 @@ def test_a_start_that_does_not_exist_is_an_error() -> None:
 
 def test_a_method_that_would_forget_the_rows_is_refused() -> None:
     task = ForScipy(bowl, np.zeros(3), constraints=ROWS)
-    with pytest.raises(InvalidInputError, match="needs a method that keeps them, got 'L-BFGS-B': use SLSQP"):
+    with pytest.raises(InvalidInputError, match=r"constraints need SLSQP, .*, got 'L-BFGS-B'"):
         task.arguments("L-BFGS-B")
 
 
 def test_a_problem_that_was_not_evaluated_has_no_best_design() -> None:
-    with pytest.raises(InvalidInputError, match="none of 0 designs that were evaluated is feasible"):
+    with pytest.raises(InvalidInputError, match="no design of 0 is feasible"):
         _ = ForScipy(bowl, np.zeros(3)).best
 
 
@@ -215,16 +215,16 @@ def test_no_constraints_are_none() -> None:
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (NonlinearConstraint(curve, 0.0, 1.0), "must have its derivative as the function jac, got '2-point'"),
+        (NonlinearConstraint(curve, 0.0, 1.0), r"jac must be a function \(the derivative\), got '2-point'"),
         (
             NonlinearConstraint(curve, [0.0, 0.0], [1.0, 1.0], jac=lambda x: 2 * x),
-            "a NonlinearConstraint with 1 components must have as many limits, or one for all, got lb",
+            "1 components need as many limits, got",
         ),
         ({"type": "ineq", "fun": curve}, "must be objects, got a dict: write NonlinearConstraint"),
         (A, "must be LinearConstraints or NonlinearConstraint, or SciPy's, .*, got a ndarray: write"),
-        (LinearConstraint(A[:, :2]), r"a matrix of 3 columns, one for each variable, got shape \(3, 2\)"),
-        (LinearConstraint(A[0], 2.0, 1.0), "must have lb <= ub in every row, got lb"),
-        (LinearConstraint(A[0], np.nan, 1.0), "must have lb <= ub in every row, got lb"),
+        (LinearConstraint(A[:, :2]), r"a matrix of 3 columns, got shape \(3, 2\)"),
+        (LinearConstraint(A[0], 2.0, 1.0), "must have lb <= ub, got lb"),
+        (LinearConstraint(A[0], np.nan, 1.0), "must have lb <= ub, got lb"),
     ],
 )
 def test_other_constraints_are_refused_by_name(given: Any, told: str) -> None:
@@ -315,7 +315,7 @@ def test_small_bundles_and_constraints_go_with_them() -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ((np.zeros(2), np.zeros((2, 3))), r"pieces must return values \(k,\) and subgradients \(k, 8\), got"),
+        ((np.zeros(2), np.zeros((2, 3))), r"pieces must return \(k,\), \(k, 8\), got"),
         ((np.array([np.nan]), np.zeros((1, 8))), "pieces must return finite values"),
     ],
 )

@@ -95,7 +95,7 @@ def test_restriction_to_a_face_keeps_only_its_columns(G):
 
 
 def test_wrong_load_length_is_refused(G):
-    with pytest.raises(InvalidInputError, match=r"e must have shape \(4,\) like the rows of G, got \(3,\)"):
+    with pytest.raises(InvalidInputError, match=r"e must have 4 entries as G, got \(3,\)"):
         coarse_space(G, np.zeros(3))
 
 

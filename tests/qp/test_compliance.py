@@ -149,5 +149,5 @@ def test_the_resolvent_is_that_of_a_disc_on_a_spring() -> None:
 
 def test_smalse_refuses_rows_that_give_way() -> None:
     problem, bound = softened(0, [LinearClosure(1.0)])
-    with pytest.raises(InvalidInputError, match="SMALSE needs surfaces that do not give way"):
+    with pytest.raises(InvalidInputError, match="SMALSE needs no closure laws"):
         solve(problem, bound, Smalse())

@@ -130,9 +130,9 @@ def test_smalse_refuses_a_bound_that_follows_the_multiplier():
 @pytest.mark.parametrize(
     ("friction_coefficient", "message"),
     [
-        (np.full(11, 0.3), r"friction_coefficient must have shape \(12,\), got \(11,\)"),
-        (np.full(12, -0.1), "friction_coefficient must be finite and not negative, got -0.1"),
-        (np.full(12, np.inf), "friction_coefficient must be finite"),
+        (np.full(11, 0.3), r"friction_coefficient needs shape \(12,\), got \(11,\)"),
+        (np.full(12, -0.1), r"friction_coefficient must be in \[0, ∞\), got -0.1"),
+        (np.full(12, np.inf), r"friction_coefficient must be in \[0, ∞\), got 0.*inf|inf"),
     ],
 )
 def test_bad_friction_coefficient_is_refused(friction_coefficient, message):
@@ -401,6 +401,6 @@ def test_a_law_in_scaled_multipliers_has_the_same_answer() -> None:
 
 @pytest.mark.parametrize("given", [-1.0, np.nan, np.full(COUNT, -1.0)])
 def test_a_given_bound_that_is_none_is_refused(given) -> None:
-    with pytest.raises(ValueError, match="slip_bound must be finite and not negative"):
+    with pytest.raises(ValueError, match=r"slip_bound must be in \[0, ∞\)"):
         CoulombLaw(layout(), Proportional(np.zeros(COUNT)), given)
     assert not TrescaLaw(layout(), np.zeros(COUNT)).grows

@@ -26,12 +26,15 @@ def test_layout_without_contact_has_equality_rows_only():
         ({"normal": [0, 3]}, "must be distinct and lie in 0..2"),
         ({"normal": [1, 1]}, "must be distinct"),
         ({"normal": [0], "tangential": [[0, 1]]}, "must be distinct"),
-        ({"normal": [0], "tangential": [[1, 2]], "friction_of": [1]}, "distinct contacts in 0..0"),
+        (
+            {"normal": [0], "tangential": [[1, 2]], "friction_of": [1]},
+            "friction_of must name distinct contacts",
+        ),
         (
             {"normal": [0], "tangential": [[1, 2]], "friction_of": [0, 0]},
             r"friction_of must have shape \(1,\)",
         ),
-        ({"normal": [[0]]}, "normal of shape"),
+        ({"normal": [[0]]}, r"give normal \(n,\)"),
     ],
 )
 def test_inconsistent_layout_is_refused(arguments, message):

@@ -365,7 +365,7 @@ def test_unheld_motion_is_the_sliding_of_the_upper_brick():
 def test_brick_pulled_away_from_its_support_is_refused(solver):
     dual, _ = torn_problem(Bricks(friction=False, shear=0.0, press=-0.01))
     with pytest.raises(
-        InfeasibleError, match=r"no admissible multiplier comes closer than .* % of it"
+        InfeasibleError, match=r"contact and friction must balance the load, but leave .* % of it"
     ) as caught:
         solve(dual, None, solver)
     rows = str(caught.value).split("rows [")[1].split("]")[0]
@@ -374,13 +374,13 @@ def test_brick_pulled_away_from_its_support_is_refused(solver):
 
 def test_brick_pulled_sideways_without_friction_is_refused():
     dual, _ = torn_problem(Bricks(friction=False, shear=0.002))
-    with pytest.raises(InfeasibleError, match="no row of B resists: support or glue that body"):
+    with pytest.raises(InfeasibleError, match="but no row of B: support it"):
         solve(dual, None, FaceNewton())
 
 
 def test_brick_pulled_harder_than_its_friction_is_refused():
     dual, _ = torn_problem(Bricks(shear=0.002))
-    with pytest.raises(InfeasibleError, match="turn the load into the contact or raise the friction"):
+    with pytest.raises(InfeasibleError, match="add a support, or raise the friction"):
         solve(dual, np.full(dual.layout.n_friction, 1e-5), FaceNewton())
 
 
@@ -395,9 +395,7 @@ def test_loaded_motion_without_any_row_is_refused():
         layout,
         np.ones(2),
     )
-    with pytest.raises(
-        InfeasibleError, match=r"the load works 2.000e\+00 on row 1 of e and no row of B resists"
-    ):
+    with pytest.raises(InfeasibleError, match=r"row 1 of e, has load 2.000e\+00 but no row of B"):
         solve(problem, None, FaceNewton())
 
 

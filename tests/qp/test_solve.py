@@ -70,9 +70,7 @@ def test_tresca_friction_acts_without_normal_force_too(solver):
 
 
 def test_projected_cg_refuses_contact():
-    with pytest.raises(
-        InvalidInputError, match="projected CG needs a problem without contact, got 12 contacts"
-    ):
+    with pytest.raises(InvalidInputError, match="projected CG needs no contact, got 12"):
         solve(random_problem(1).dual, np.ones(12), ProjectedCG())
 
 
@@ -82,7 +80,7 @@ def test_projected_cg_refuses_contact():
         ({"rhs": np.zeros(5)}, "rhs must have 56 entries"),
         ({"diagonal": np.ones(5)}, "diagonal must have 56 entries"),
         ({"rhs": np.full(56, np.nan)}, "rhs must be finite, got 56 entries that are not"),
-        ({"diagonal": np.zeros(56)}, "diagonal must be positive on every contact row, got 0.0"),
+        ({"diagonal": np.zeros(56)}, "diagonal must be positive on contact, got 0.0"),
         ({"layout": ContactLayout.build(50)}, "must have 50 entries"),
     ],
 )
@@ -95,11 +93,11 @@ def test_unusable_problem_is_refused(change, message):
 @pytest.mark.parametrize(
     ("slip_bound", "mu_f", "message"),
     [
-        (None, None, "12 friction discs need a slip_bound or a friction_coefficient, got neither"),
+        (None, None, "friction discs need a slip_bound or friction_coefficient, got neither"),
         (np.ones(11), np.ones(12), r"slip_bound must have shape \(12,\)"),
-        (np.ones(12), -np.ones(12), "friction_coefficient must be finite and not negative"),
+        (np.ones(12), -np.ones(12), r"friction_coefficient must be in \[0, ∞\)"),
         (np.ones(11), None, r"slip_bound must have shape \(12,\)"),
-        (-np.ones(12), None, "slip_bound must be finite and not negative"),
+        (-np.ones(12), None, r"slip_bound must be in \[0, ∞\)"),
     ],
 )
 def test_unclear_friction_is_refused(slip_bound, mu_f, message):
@@ -109,9 +107,7 @@ def test_unclear_friction_is_refused(slip_bound, mu_f, message):
 
 def test_start_of_the_wrong_length_is_refused():
     problem = random_problem(1)
-    with pytest.raises(
-        InvalidInputError, match=r"start must have shape \(56,\) like this rank's owned vector"
-    ):
+    with pytest.raises(InvalidInputError, match=r"start must have shape \(56,\), got \(3,\)"):
         solve(problem.dual, problem.slip_bound, FaceNewton(), np.zeros(3))
 
 
@@ -120,7 +116,7 @@ def test_start_of_the_wrong_length_is_refused():
     [
         (
             Smalse(tolerance=1e-12, max_products=40),
-            r"SMALSE needs residuals below 1.0e-12, got after \d+ products",
+            r"SMALSE needs residuals below 1.0e-12, got",
         ),
         (FaceNewton(tolerance=1e-12, max_products=20), r"face Newton needs residuals below 1.0e-12"),
     ],
@@ -141,7 +137,7 @@ def test_solver_that_claims_too_much_is_found_out():
             return FaceNewton(tolerance=1e-2).run(problem, start)
 
     problem = random_problem(1)
-    with pytest.raises(ConvergenceError, match="claims convergence that its own answer does not show"):
+    with pytest.raises(ConvergenceError, match="the solver's answer must have residuals below"):
         solve(problem.dual, problem.slip_bound, Boaster())
 
 
