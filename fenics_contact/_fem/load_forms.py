@@ -101,8 +101,7 @@ def from_ufl(load: Load, value: Ufl, element: Element) -> Expr:
     if result.ufl_shape != shape:
         kind = "a scalar" if is_scalar(load) else f"a vector of {width} components"
         raise InvalidInputError(
-            f"the UFL value of {type(load).__name__} on body {load.body!r} must have shape {shape}, got "
-            f"{result.ufl_shape}: return {kind}"
+            f"{type(load).__name__} on {load.body!r} needs shape {shape}, got {result.ufl_shape}: {kind}"
         )
     return result
 

@@ -187,7 +187,6 @@ def _turning(load: TotalForce, surface: SurfaceMoments, moment: np.ndarray) -> n
     along = axes.T @ moment
     if size[0] <= ROUNDING * size[-1]:
         raise InvalidInputError(
-            f"a moment needs a surface that is no line, surface {load.surface!r} of body {load.body!r} is "
-            f"{np.sqrt(size[0] / size[-1]):.1e} times as wide as long: choose a wider one"
+            f"surface {load.surface!r} of {load.body!r} must not be a line for a moment: choose a wider one"
         )
     return np.asarray(axes @ (along / size))

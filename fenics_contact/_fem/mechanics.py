@@ -254,9 +254,7 @@ class HistoryMechanics:
             return np.zeros(self.history_shape)
         if history.shape != self.history_shape:
             raise InvalidInputError(
-                f"the history of this mesh must have shape {self.history_shape} (cells, Gauss points, "
-                f"internal variables), got {history.shape}: it belongs to another mesh or other materials; "
-                "start with None"
+                f"the history must have shape {self.history_shape}, got {history.shape}: start with None"
             )
         return history
 

@@ -75,10 +75,7 @@ def _checked_step(
     name, given = type(material).__name__, (gradient.copy(), history.copy())
     end = material.answer(*given, duration)
     if not (np.array_equal(given[0], gradient) and np.array_equal(given[1], history)):
-        raise InvalidInputError(
-            f"respond of {name} must leave its arguments as they are, it has written into gradient or "
-            "history: Newton's method asks again from the same start, so work on copies"
-        )
+        raise InvalidInputError(f"respond of {name} must not write into its arguments: work on copies")
     other = material.answer(gradient[::-1], history[::-1], duration)
     pairs = ((end.stress, other.stress), (end.tangent, other.tangent), (end.history, other.history))
     sizes = [np.abs(one).max(initial=0.0) for one, _ in pairs]
@@ -87,9 +84,7 @@ def _checked_step(
     )
     if not all(same):
         raise InvalidInputError(
-            f"respond of {name} must answer for each point by itself and alike when asked again, in "
-            "reversed order its answers are others: take no sums or indices over points, and keep nothing in "
-            "the object"
+            f"respond of {name} must answer each point alone: take no sums over points, keep no state"
         )
     return end
 
@@ -117,18 +112,15 @@ def _check_tangent(
         return
     if not len(smooth):
         raise InvalidInputError(
-            f"the stress of {type(material).__name__} must be a continuous function of the gradient, it has "
-            "kinks or jumps at every point tried: check it, or give another size"
+            f"the stress of {type(material).__name__} must be continuous, it jumps at every point tried"
         )
     worst = error > 0.99 * error.max()  # the first of equals, whatever the rounding
     point, i, j, k, m = (int(place) for place in np.unravel_index(worst.argmax(), error.shape))
     wrong = np.count_nonzero(error.max(axis=(1, 2, 3, 4)) > tolerance * size)
     here = smooth[point], i, j, k, m
     raise InvalidInputError(
-        f"the tangent of {type(material).__name__} must be the derivative of its stress for the same step, "
-        f"it is not at {wrong} of {len(smooth)} points: dP[{i},{j}]/dH[{k},{m}] is {end.tangent[here]:.6g} "
-        f"in the tangent and {central[here]:.6g} by difference quotients: differentiate the update of the "
-        "step (consistent tangent), not the rate equations"
+        f"the tangent of {type(material).__name__} must be the derivative of its stress (consistent): "
+        f"dP[{i},{j}]/dH[{k},{m}] is {end.tangent[here]:.6g}, not {central[here]:.6g} ({wrong} points)"
     )
 
 
@@ -153,8 +145,7 @@ def _check_rotation(
     error, size = np.abs(found - expected).max(), np.abs(end.stress).max()
     if not error <= 1e-6 * size:
         raise InvalidInputError(
-            f"the stress of {name} (finite = {material.finite}) must {needed}, it misses that by "
-            f"{error / size:.1e} of its largest entry: {remedy}"
+            f"the stress of {name} must {needed}, it misses that by {error / size:.1e}: {remedy}"
         )
 
 
@@ -184,26 +175,19 @@ def check_model(material: Material, element: Element, bind: Bind) -> None:
     name = type(material).__name__
     K, points = stiffness_of_cell(skewed(_unit_cell(element)), element, bind)
     if not np.isfinite(K).all():
-        raise InvalidInputError(
-            f"stiffness and load must be finite, got NaN or infinity in the stiffness of {name}: check the "
-            "material parameters"
-        )
+        raise InvalidInputError(f"the stiffness of {name} must be finite, got NaN: check its parameters")
     size = np.abs(K).max()
     if size == 0.0:
-        raise InvalidInputError(
-            f"a material must resist strain, the stiffness of {name} is zero: check parameters and tangent"
-        )
+        raise InvalidInputError(f"the stiffness of {name} must not be zero: check parameters and tangent")
     unsymmetric = np.abs(K - K.T).max()
     if unsymmetric > ROUNDING * size:
         raise InvalidInputError(
-            f"the stiffness of a material must be symmetric, that of {name} is not (by "
-            f"{unsymmetric / size:.1e} of its largest entry): the stress must follow from an energy"
+            f"the stiffness of {name} must be symmetric, is not by {unsymmetric / size:.1e}: use an energy"
         )
     energies = np.linalg.eigvalsh(0.5 * (K + K.T))
     if energies[0] < -ROUNDING * energies[-1]:
         raise InvalidInputError(
-            f"the energy of a material must not be negative, {name} has the eigenvalue {energies[0]:.3g} "
-            f"beside {energies[-1]:.3g}: check signs and parameters"
+            f"the energy of {name} must not be negative, got eigenvalue {energies[0]:.3g}: check signs"
         )
     R = _checked_kernel(material, points, element)
     check_kernel(K, R, f"material {name}")
@@ -211,8 +195,7 @@ def check_model(material: Material, element: Element, bind: Bind) -> None:
     # A cell of reduced integration has modes without energy of its own, whatever it is made of.
     if counted > claimed and not element.integration.has_hourglasses:
         raise InvalidInputError(
-            f"the kernel of a material must hold every motion without energy, that of {name} has {claimed} "
-            f"modes and a {element.name} has {counted} of them: add the missing ones to kernel(points)"
+            f"the kernel of {name} has {claimed} modes, a {element.name} {counted}: complete kernel(points)"
         )
 
 
@@ -229,9 +212,8 @@ def check_kernel(
     scale = stiffness.diagonal().max() * np.abs(kernel).max(initial=0.0)
     if not energy <= kernel_tolerance * scale:
         raise InvalidInputError(
-            f"the kernel must hold motions without energy alone, that of {what} does not (‖K R‖ is "
-            f"{energy / scale:.1e} of ‖K‖ ‖R‖): kernel(points) must return modes that the "
-            "stiffness annihilates"
+            f"the kernel of {what} must hold motions without energy, ‖K R‖ is {energy / scale:.1e} of ‖K‖ "
+            "‖R‖: return modes that the stiffness annihilates"
         )
 
 
@@ -247,9 +229,8 @@ def _own_kernel(material: Material, points: np.ndarray) -> np.ndarray:
         modes = np.asarray(material.kernel(points), dtype=np.float64)
     if modes.ndim != 3 or modes.shape[:2] != points.shape or not np.isfinite(modes).all():
         raise InvalidInputError(
-            f"kernel(points) of {name} must return finite modes of shape {points.shape} + (n_modes,), got "
-            f"{'NaN or infinity' if modes.shape[:2] == points.shape else f'shape {modes.shape}'}: one "
-            "displacement a point and mode"
+            f"kernel(points) of {name} must return finite modes {points.shape} + (n_modes,), got "
+            f"{modes.shape}"
         )
     return modes
 
@@ -258,10 +239,7 @@ def _checked_kernel(material: Material, points: np.ndarray, element: Element) ->
     name, R = type(material).__name__, kernel_of(material, points, element.kinematics)
     R = R.reshape(R.shape[0] * R.shape[1], R.shape[2])
     if np.linalg.matrix_rank(R, tol=1e-8 * max(np.abs(R).max(initial=0.0), 1e-300)) < R.shape[1]:
-        raise InvalidInputError(
-            f"the modes in the kernel of {name} must be independent, the {R.shape[1]} given are not: leave "
-            "out those that others make up"
-        )
+        raise InvalidInputError(f"modes of {name} must be independent: leave out those that others make up")
     return R
 
 
@@ -339,9 +317,8 @@ def check_deformed(
     stress = np.abs(rest.force).max() / scale
     if stress > 1e-10:
         raise InvalidInputError(
-            "a hyperelastic model must be free of stress at F = I, the forces on an undeformed cell of "
-            f"{name} are {stress:.1e} of those at a strain of 0.05: its energy has a slope at F = I; "
-            "subtract it, as − μ ln J does in μ/2 (tr FᵀF − 3 − 2 ln J)"
+            f"{name} must have no stress at F = I, forces are {stress:.1e} of those at a strain of 0.05: "
+            "subtract the slope of its energy, as − μ ln J in μ/2 (tr FᵀF − 3 − 2 ln J)"
         )
     _check_derivatives(cell, u.ravel(), scale, name, tolerance)
     if element.kinematics.can_rotate:
@@ -352,8 +329,7 @@ def _finite(cell: Mechanics, u: np.ndarray, name: str) -> Response:
     found = cell.at(u)
     if not all(np.isfinite(part).all() for part in (_energy(found), found.force, found.stiffness.data)):
         raise InvalidInputError(
-            "energy, stress and tangent of a hyperelastic model must be finite at F = I and at strains of a "
-            f"few per cent, those of {name} are not: check its parameters, logarithms, roots and quotients"
+            f"energy, stress and tangent of {name} must be finite at F = I and near it: check its logarithms"
         )
     return found
 
@@ -377,9 +353,7 @@ def _check_derivatives(cell: Mechanics, u: np.ndarray, scale: float, name: str, 
     for what, error in wrong.items():
         if not error <= tolerance:
             raise InvalidInputError(
-                "stress and tangent of a hyperelastic model must be the derivatives of its energy, the "
-                f"{what} of {name} differs from the difference quotient by {error:.1e}: write the energy "
-                "alone, both follow"
+                f"stress and tangent must be derivatives of energy, {what} of {name} is off by {error:.1e}"
             )
 
 
@@ -394,7 +368,5 @@ def _check_rotated_energy(
     difference = abs(after - before) / (scale * np.abs(u).max())
     if not difference <= 1e-9:
         raise InvalidInputError(
-            "a rotation of the deformed body must not change the energy of a hyperelastic model, that of "
-            f"{name} changes by {difference:.1e} of its size: write it in terms of FᵀF, its invariants and "
-            "det F"
+            f"rotation must not change the energy of {name}, off by {difference:.1e}: use FᵀF and det F"
         )

@@ -134,8 +134,7 @@ class Templates:
             on_root_then_bcast(self._comm, check_compiler)
             raise InvalidInputError(
                 f"{what} must be UFL that compiles, got {type(error).__name__}: {error}: check quotients, "
-                "roots and logarithms in it, also at rest (F = I), and that the "
-                "directory of compiled forms, $XDG_CACHE_HOME/fenics or ~/.cache/fenics, can be written"
+                "roots and logarithms at F = I, and that ~/.cache/fenics or $XDG_CACHE_HOME can be written"
             ) from error
 
 
@@ -144,8 +143,7 @@ def _check_numbers(form: ufl.Form, what: str) -> None:
     bad = [number for number in extract_type(form, FloatValue) if not np.isfinite(float(number))]
     if bad:
         raise InvalidInputError(
-            f"numbers in UFL must be finite, got {float(bad[0])} in {what}: check what stresses, energies "
-            "and loads in UFL are made of"
+            f"numbers in UFL must be finite, got {float(bad[0])} in {what}: check its constants"
         )
 
 

@@ -132,9 +132,8 @@ def regular_factor(
     if least <= rounded:
         row = failed or int((factor.diagonal() ** 2 / diagonal).argmin()) + 1
         raise InvalidInputError(
-            "the stiffness of every subdomain must be positive definite up to its kernel, but its Schur "
-            f"complement loses definiteness in row {row}: check the material and the kernel of the model; "
-            f"{ONE_LAYER}"
+            "the stiffness of every subdomain must be positive definite up to its kernel, but loses it in "
+            f"row {row}: check the material and kernel of the model; {ONE_LAYER}"
         )
     return RegularFactor(factor, modes, float(rho), least)
 

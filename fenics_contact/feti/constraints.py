@@ -18,7 +18,6 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import SuperLU, splu
 
-from fenics_contact._base.display import counted
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.following import followed_nodes
 from fenics_contact._pairing.points import HELD, ContactPoints
@@ -158,8 +157,7 @@ class ConstraintRows(Joint):
             count = own.stop - own.start
             if not isinstance(each.value, float) and len(each.value) != count:
                 raise InvalidInputError(
-                    f"LinearConstraint {each.label!r} has {counted(count, 'equation')}, got "
-                    f"{len(each.value)} values: give one, or one for each"
+                    f"LinearConstraint {each.label!r} needs 1 or {count} values, got {len(each.value)}"
                 )
             values[own] = each.value
         return values
@@ -174,9 +172,7 @@ class ConstraintRows(Joint):
         if (left > near * scale).any():
             worst = int(np.argmax(left))
             raise InfeasibleError(
-                f"equations of linear constraints must agree with each other and with supports, but "
-                f"{self._named(worst)} is violated by {left[worst]:.3g} whatever the bodies do: correct its "
-                "value, or leave it out"
+                f"{self._named(worst)} contradicts others or supports by {left[worst]:.3g}: correct its value"
             )
         if moving.shape[1]:
             motions = np.abs(
@@ -184,9 +180,8 @@ class ConstraintRows(Joint):
             ).ravel()
             if (motions > near * abs(moving).max()).any():
                 raise InfeasibleError(
-                    "equations must act on bodies that deform, but "
-                    f"{self._named(int(np.argmax(motions)))} is between supports and rigid surfaces with "
-                    "free components: prescribe these"
+                    f"{self._named(int(np.argmax(motions)))} acts on no body that deforms: prescribe "
+                    "components"
                 )
 
     def _left(self, values: np.ndarray | sp.csr_matrix) -> np.ndarray:

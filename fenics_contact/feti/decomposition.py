@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.costs import count_messages, count_of_exchange, with_ledger
-from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, PETSc, free_communicators, start
 from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
@@ -217,10 +217,8 @@ def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalA
         if clash.any():
             node, component = np.argwhere(clash)[0]
             raise InvalidInputError(
-                f"supports must agree where they meet: component {component} of "
-                f"{counted(int(clash[:, component].sum()), 'node')} of surface {support.surface!r} of body "
-                f"{support.body!r} already has another value than {given[node, component]:g}: leave the "
-                "component free (None) in one of them"
+                f"supports must agree where they meet: component {component} of surface {support.surface!r} "
+                f"of body {support.body!r} has another value than {given[node, component]:g}: leave one None"
             )
         prescribed[nodes] = np.where(np.isnan(given), known, given)
     for name in tearing.body_names:
@@ -267,15 +265,11 @@ class GluingRows:
         """Return c of the rows for displacements from `prescribed_along`."""
         if not same_axes(axes, self.axes):
             raise InvalidInputError(
-                "where the meshes of a scene change its supports may change their values, not what they "
-                "hold: its rollers hold nodes along other directions than when the scene was decomposed: "
-                "decompose it again, or give the rollers a direction, which stays"
+                "supports may change values alone, rollers hold other directions: decompose the scene again"
             )
         if not np.array_equal(~np.isnan(prescribed), self.fixed):
             raise InvalidInputError(
-                "where the meshes of a scene change its supports may change their values, not what they "
-                f"hold: {np.count_nonzero(self.fixed)} components were prescribed when the scene was "
-                f"decomposed, now {np.count_nonzero(~np.isnan(prescribed))} or others are: decompose it again"
+                "supports may change values alone, they hold other components: decompose the scene again"
             )
         return np.nan_to_num(prescribed).ravel()[self.dof]
 
@@ -482,9 +476,7 @@ def decompose(
         tearing = tear(scene, partitions, comm.size, cell_stiffness(scene, forms))
         if tearing.n_subdomains < comm.size:
             raise InvalidInputError(
-                f"every rank needs a subdomain, but {comm.size} ranks share {tearing.n_subdomains} "
-                f"subdomains: partition with scene.partition({comm.size}), cut the bodies finer, or run on "
-                "fewer ranks"
+                f"{comm.size} ranks need as many subdomains, got {tearing.n_subdomains}: use scene.partition"
             )
         here = np.flatnonzero(tearing.subdomain_rank == comm.rank)
         _check_communicators(len(here), each=20 if scene.is_nonlinear else 14)
@@ -507,24 +499,14 @@ def _whole(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
 
 def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> None:
     if not isinstance(partitions, Mapping):
-        raise InvalidInputError(
-            f"partitions must give the subdomain of each cell by the names of bodies, got {partitions!r}: "
-            "leave them out, or cut bodies by fenics_contact.box_partition or mesh.bisection_partition"
-        )
+        raise InvalidInputError(f"partitions must be by names of bodies, got {partitions!r}: leave it out")
     for name, body in scene.bodies.items():
         if name not in partitions:
-            raise InvalidInputError(
-                f"every body needs a partition, got them for {sorted(partitions)} but not for {name!r}: "
-                "pass the subdomain of each of its cells"
-            )
+            raise InvalidInputError(f"every body needs a partition, {name!r} has none: pass its cells")
         partition = partitions[name]
         if not isinstance(partition, np.ndarray) or partition.shape != (body.mesh.n_cells,):
             given = partition.shape if isinstance(partition, np.ndarray) else repr(partition)
-            raise InvalidInputError(
-                f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one "
-                f"subdomain per cell, got {given}: fenics_contact.box_partition or "
-                "mesh.bisection_partition cuts a mesh into a number of subdomains"
-            )
+            raise InvalidInputError(f"partitions[{name!r}] needs shape ({body.mesh.n_cells},), got {given}")
         check_face_connected(body.mesh, pieces(body.mesh, partition))
 
 
@@ -537,9 +519,8 @@ def _check_communicators(subdomains: int, each: int) -> None:
     left = free_communicators(needed)
     if left < needed:
         raise InvalidInputError(
-            f"{subdomains} subdomains of a rank need about {needed} communicators of MPI, but "
-            f"MPICH has only {left} left: let go of states that are not needed any more (del), cut the "
-            "bodies into fewer subdomains, use more ranks, or take Open MPI"
+            f"{subdomains} subdomains need about {needed} communicators of MPI, MPICH has {left} left: "
+            "delete states, use fewer subdomains, more ranks, or Open MPI"
         )
 
 

@@ -98,9 +98,8 @@ class DirectSystem:
             norm = max(norm, float(np.finfo(float).eps) * summed)
         if not error <= WRONG**2 * norm:
             raise ConvergenceError(
-                f"a factored stiffness needs an error below {WRONG:g} in energy norm, the residual shows "
-                f"{np.sqrt(abs(error) / (norm or 1.0)):.1e} after refinement: the body is too slender, its "
-                "cells are too flat, or its materials too different for double precision"
+                f"the error must be below {WRONG:g}, got {np.sqrt(abs(error) / (norm or 1.0)):.1e}: "
+                "use less slender bodies and cells, or more similar materials"
             )
         reaction, residual = missing[self._fixed], float(np.linalg.norm(missing[free]) / scale)
         return DirectSolution(self._axes.back(displacement), reaction, residual)

@@ -447,8 +447,7 @@ class DualSystem:
         driven, loads = work[:-1] + self._unheld_points.T @ self.torn.free.load, self._size(work[-1])
         if np.abs(driven).max() > unbalanced * loads:
             raise InfeasibleError(
-                "every loaded body must be held by supports, ties or contact, but the load works "
-                f"{max(driven, key=abs):.3e} on a rigid motion that nothing resists: support that body"
+                f"every loaded body must be held, a motion has load {max(driven, key=abs):.3e}: support it"
             )
 
     def _resultants(self, comm: MPI.Comm) -> np.ndarray:

@@ -92,9 +92,7 @@ def without_held(
         touched = int(np.count_nonzero(abs(moved).max(axis=1).toarray() > least)) if len(held) else 0
         if touched:
             raise InvalidInputError(
-                f"contact needs bodies that deform, but in {touched} of its rows supports hold the slave "
-                "and the master is a rigid surface with free components: prescribe these, or leave the "
-                "slave free"
+                f"{touched} rows of contact join held slaves and free rigid masters: prescribe or free these"
             )
         moving[rows] = 0.0
     return (sp.diags(moving) @ columns).tocsr()
@@ -153,9 +151,7 @@ def _independent(
     along = turned @ load
     if np.abs(along[~moves]).max() > near * np.abs(load).max():
         raise InfeasibleError(
-            f"the moment on rigid surface {surface.surface!r} of body {surface.body!r} turns about the line "
-            "of its nodes, which moves none of them: name three nodes that are not in a line, or leave it "
-            "out"
+            f"nodes of {surface.surface!r} of {surface.body!r} lie on the axis of its moment: name others"
         )
     return basis @ left[:, moves[: len(left)]], along[moves] / size[moves]
 
@@ -169,8 +165,7 @@ def _require_flexible_slaves(scene: Scene, tearing: Tearing, moving: np.ndarray)
             surface = f"of surface {pair.slave.name!r} of body {pair.slave.body!r}"
             lie = counted(int(moving[nodes].sum()), f"node {surface} lies", f"nodes {surface} lie")
             raise InvalidInputError(
-                f"slaves must be flexible, but {lie} on a rigid surface with free components: exchange slave "
-                "and master, or let the rigid surface end before the slave begins"
+                f"slaves must be flexible, but {lie} on a free rigid surface: exchange them"
             )
 
 
@@ -179,8 +174,6 @@ def _require_room(surface: AnySupport, modes: np.ndarray, held: np.ndarray) -> N
     against = np.abs(modes[held]).max(axis=0, initial=0.0)
     if np.any(against > ROUNDING):
         raise InvalidInputError(
-            f"the rigid surface {surface.surface!r} of body {surface.body!r} meets another support at "
-            f"{counted(int(held.any(axis=1).sum()), 'node')}, which holds what the surface is free to move: "
-            "prescribe displacement and rotation as the support does; at a plane of symmetry displacements "
-            "across it and rotations about both axes within it are zero"
+            f"rigid surface {surface.surface!r} of body {surface.body!r} meets another support at "
+            f"{counted(int(held.any(axis=1).sum()), 'node')}: prescribe the same displacement and rotation"
         )

@@ -29,11 +29,8 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
         body = f"of {pair.slave.body!r}"
         nodes = counted(int(deep.sum()), f"node {body} lies", f"nodes {body} lie up to")
         raise InvalidInputError(
-            f"bodies must not overlap at the start: {nodes} "
-            f"{-points.gap[worst]:.3g} inside the master, more than the faceting of the surfaces explains "
-            f"({-allowed[worst]:.3g}): move the bodies apart; for a press fit declare the overlap by "
-            "ContactPair(interference='measured'), or give its amount, interference=0.05; adjust= puts "
-            "points in touch without strain"
+            f"bodies must not overlap at the start: {nodes} {-points.gap[worst]:.3g} inside the master, not "
+            f"{-allowed[worst]:.3g} as facets: move them, or give the pair interference='measured' or adjust="
         )
 
 
@@ -52,9 +49,8 @@ def gap_with_room(
     pressed = missing > np.where(points.given, HELD, 1.0) * _explained(points)
     if pressed.any():
         raise InvalidInputError(
-            f"supports must leave room between surfaces that they hold on both sides, but {pressed.sum()} "
-            f"contact nodes are pressed up to {missing.max():.3g} into their master: prescribe one of the "
-            "bodies only, another displacement, or less interference there"
+            f"supports must leave room between surfaces, but {pressed.sum()} contact nodes are pressed up to "
+            f"{missing.max():.3g} into their master: prescribe one body alone, or less interference"
         )
     return points.gap + np.maximum(missing, 0.0)
 

@@ -127,10 +127,8 @@ class SectionRows(BondedPoints):
             preload = scene.preloads[number]
             if preload.force and way > least:
                 raise InfeasibleError(
-                    f"a preload must draw parts against each other, but that of body {preload.body!r} acts "
-                    f"against an open joint: nothing resists its force of {preload.force:g} between the "
-                    "parts on both sides of its section. Let head and nut, and what they clamp, have "
-                    "contacts or ties, or give a shortening in place of the force"
+                    f"a preload must draw parts together, that of body {preload.body!r} acts against an open "
+                    f"joint, force {preload.force:g}: add contacts or ties, or give a shortening"
                 )
 
 
@@ -174,14 +172,12 @@ def _section_points(
             held |= lost.max(axis=1) > slight
         if held.any():
             raise InvalidInputError(
-                f"supports must leave sections of preloads free along their normals, but they hold "
-                f"{counted(int(held.sum()), 'node')} of that of body {preload.body!r}: put the section "
-                "elsewhere; at a plane of symmetry that contains the axis hold only what is normal to it"
+                f"supports must leave sections of preloads free, hold {counted(int(held.sum()), 'node')} "
+                f"of body {preload.body!r}: put it elsewhere, or hold only what is normal to it"
             )
         if np.isin(behind, ties.slave).any() and np.isin(before, ties.slave).any():
             raise InvalidInputError(
-                "sections of preloads must not cut slaves of ties, which hold them together, but that of "
-                f"body {preload.body!r} does: put the section elsewhere, or make that surface the master"
+                f"a section must not cut slaves of ties, that of body {preload.body!r} does: put it elsewhere"
             )
         normals = np.tile(normal, (count, 1))
         master = sp.csr_matrix((np.ones(count), before, np.arange(count + 1)), shape=(count, numbers.n_nodes))

@@ -546,6 +546,5 @@ def common_kernel(materials: Sequence[Material], points: np.ndarray, kinematics:
 def _check_finite(values: np.ndarray, mesh: SubdomainMesh) -> None:
     if not np.isfinite(values).all():
         raise InvalidInputError(
-            f"stiffness and load of subdomain {mesh.number} of body {mesh.body!r} must be finite, got NaN or "
-            "infinity: check the material parameters, the loads and the coordinates"
+            f"subdomain {mesh.number} of body {mesh.body!r} must be finite, got NaN: check material and loads"
         )

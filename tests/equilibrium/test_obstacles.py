@@ -342,7 +342,7 @@ def test_an_interference_stays_over_load_steps() -> None:
 def test_overlap_without_a_word_is_refused_or_told(around: int, caplog: pytest.LogCaptureFixture) -> None:
     scene = press_fit(around, 8, overlap=INTERFERENCE)
     if around == 400:
-        match = r"up to 0\.05 inside .*declare the overlap by ContactPair\(interference='measured'\), or give"
+        match = r"up to 0\.05 inside .*give the pair interference='measured'"
         with pytest.raises(InvalidInputError, match=match):
             solved_fit(scene)
         return

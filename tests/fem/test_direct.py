@@ -76,7 +76,7 @@ def test_a_damaged_factor_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
         self._factor.solve = wrong
 
     monkeypatch.setattr(DirectSystem, "__init__", damaged)
-    with pytest.raises(ConvergenceError, match="needs an error below"):
+    with pytest.raises(ConvergenceError, match="the error must be below"):
         solve_scene(cantilever(3.0, 5), MPI.COMM_SELF)
 
 

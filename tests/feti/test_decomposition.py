@@ -21,7 +21,7 @@ from tests.feti.scenes import CELLS, STEEL, clamped_block, lone_block, touching_
 def test_a_body_without_partition_is_refused() -> None:
     scene, partitions = touching_blocks()
     del partitions["upper"]
-    message = r"every body needs a partition, got them for \['lower', 'third'\] but not for 'upper': pass"
+    message = r"every body needs a partition, 'upper' has none: pass"
     with pytest.raises(InvalidInputError, match=message):
         decompose(scene, partitions, MPI.COMM_SELF)
 
@@ -31,9 +31,9 @@ def test_a_body_without_partition_is_refused() -> None:
     [
         (
             {"block": 4},
-            r"the partition of body 'block' must have shape \(64,\), .* got 4: fenics_contact.box_partition",
+            r"partitions\['block'\] needs shape \(64,\), got 4",
         ),
-        (4, "partitions must give the subdomain of each cell by the names of bodies, got 4: leave them out"),
+        (4, "partitions must be by names of bodies, got 4: leave it out"),
     ],
 )
 def test_a_number_of_subdomains_is_no_partition(partitions: Any, message: str) -> None:
@@ -44,7 +44,7 @@ def test_a_number_of_subdomains_is_no_partition(partitions: Any, message: str) -
 
 def test_a_partition_of_another_mesh_is_refused() -> None:
     scene, partitions = lone_block("hexahedron")
-    message = r"the partition of body 'block' must have shape \(64,\), one subdomain per cell, got \(63,\)"
+    message = r"partitions\['block'\] needs shape \(64,\), got \(63,\)"
     with pytest.raises(InvalidInputError, match=message):
         decompose(scene, {"block": partitions["block"][1:]}, MPI.COMM_SELF)
 
@@ -84,7 +84,7 @@ def test_subdomains_for_which_mpich_has_no_communicators_are_refused(monkeypatch
     mpich.Exception = MPI.Exception
     monkeypatch.setattr(libraries, "MPI", mpich)
     decomposition._check_communicators(3, each=10)
-    with pytest.raises(InvalidInputError, match="about 40 communicators of MPI, but MPICH has only 5 left"):
+    with pytest.raises(InvalidInputError, match="about 40 communicators of MPI, MPICH has 5 left"):
         decomposition._check_communicators(4, each=10)
     assert len(freed) == 35
 

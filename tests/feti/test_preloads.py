@@ -230,7 +230,7 @@ def test_a_section_may_cut_the_master_of_a_tie_but_not_its_slave(by):
     assert stress[:, 8] == pytest.approx(10.0, abs=1e-7)
     assert state.preloads()["bar"].shortening == pytest.approx(10.0 * LENGTH / 1000.0, rel=1e-8)
     turned = Scene(bodies, supports, ties=[Tie(*sides[::-1], True, by)], preloads=drawn)
-    with pytest.raises(InvalidInputError, match="sections of preloads must not cut slaves of ties, which"):
+    with pytest.raises(InvalidInputError, match="a section must not cut slaves of ties, that of body 'bar'"):
         solve_scene(turned, MPI.COMM_SELF)
 
 
@@ -260,14 +260,14 @@ def test_sections_that_meet_are_refused():
 
 def test_preload_against_an_open_joint_is_refused():
     scene = Scene({"bar": Body(bar(), SOFT)}, [Support("bar", "z0")], preloads=[Preload("bar", MIDDLE, 3.0)])
-    with pytest.raises(InfeasibleError, match="acts against an open joint: nothing resists its force of 3"):
+    with pytest.raises(InfeasibleError, match="acts against an open joint, force 3"):
         solve_scene(scene, MPI.COMM_SELF)
 
 
 def test_supports_that_hold_a_section_are_refused():
     supports = [Support("bar", "z0"), Support("bar", "y0")]
     scene = Scene({"bar": Body(bar(), SOFT)}, supports, preloads=[Preload("bar", MIDDLE, shortening=0.1)])
-    with pytest.raises(InvalidInputError, match="must leave sections of preloads free along their normals"):
+    with pytest.raises(InvalidInputError, match="must leave sections of preloads free, hold"):
         solve_scene(scene, MPI.COMM_SELF)
 
 
@@ -486,5 +486,5 @@ def test_a_joint_of_rubber_is_tightened_held_pulled_and_tightened_again():
 def test_rubber_preloaded_against_an_open_joint_is_refused():
     bodies = {"bar": Body(bar(), NeoHooke(1000.0, 0.0))}
     scene = Scene(bodies, [Support("bar", "z0")], preloads=[Preload("bar", MIDDLE, 3.0)])
-    with pytest.raises(InfeasibleError, match="acts against an open joint: nothing resists its force of 3"):
+    with pytest.raises(InfeasibleError, match="acts against an open joint, force 3"):
         solve_scene(scene, MPI.COMM_SELF)

@@ -355,9 +355,7 @@ def test_contacts_and_ties_of_rigid_surfaces_are_refused() -> None:
         solved(tied, COMM, parts=1)
     held = replace(tied, supports=[*tied.supports, Support("block", "z1", (None, None, 0.0))], ties=())
     held = replace(held, contacts=[ContactPair(tie.master, tie.slave)])
-    with pytest.raises(
-        InvalidInputError, match="contact needs bodies that deform, but in 9 of its rows supports"
-    ):
+    with pytest.raises(InvalidInputError, match="9 rows of contact join held slaves and free rigid masters"):
         solved(held, COMM, parts=1)
     other = replace(tied, ties=[Tie(tie.master, tie.slave)])
     (motion,) = solved(other, COMM, 1e-12, parts=1).rigid_motions()
@@ -403,7 +401,7 @@ def test_other_supports_leave_room_for_a_free_motion_in_any_unit_of_length(lengt
     scene = lever(length, IsotropicElasticity)
     turning = replace(scene.supports[0], rotation=None)  # type: ignore[type-var]
     symmetric = Support("block", "y0", (None, 0.0, None))
-    with pytest.raises(InvalidInputError, match="holds what the surface is free to move"):
+    with pytest.raises(InvalidInputError, match=r"meets another support at .* prescribe the same"):
         solve_scene(replace(scene, supports=[turning, symmetric]), COMM)
     assert solve_scene(replace(scene, supports=[scene.supports[0], symmetric]), COMM).unheld == ()
 
@@ -421,5 +419,5 @@ def test_a_single_node_is_a_rigid_surface_without_turns() -> None:
     np.testing.assert_allclose(motion.displacement, moved[0], rtol=1e-8)
     assert not np.any(motion.rotation)
     twisted = replace(corner, moment=(0.0, 1.0, 0.0))
-    with pytest.raises(InfeasibleError, match="name three nodes that are not in a line"):
+    with pytest.raises(InfeasibleError, match="lie on the axis of its moment: name others"):
         solve_scene(Scene({"bar": Body(mesh, SOFT)}, [hold, twisted]), COMM)

@@ -29,7 +29,7 @@ def test_a_schur_complement_with_a_further_null_vector_is_refused_whatever_its_r
         factor, modes, rho, _ = regular_factor(schur.copy(order="F"), null, 1.0)
         found, exact = np.tril(factor) @ np.tril(factor).T, schur + rho * modes @ modes.T
         np.testing.assert_allclose(found, exact, atol=1e-12)
-        with pytest.raises(InvalidInputError, match=r"loses definiteness in row \d+: .*two layers"):
+        with pytest.raises(InvalidInputError, match=r"but loses it in row \d+: .*two layers"):
             regular_factor(schur.copy(order="F"), null[:, :1], 1.0)
         held = schur + schur.diagonal().max() * null[:, :1] @ null[:, :1].T
         accepted += lapack.dpotrf(held, lower=1)[1] == 0

@@ -171,11 +171,11 @@ def test_loads_are_equal_when_their_numbers_or_functions_are() -> None:
         ),
         (
             BodyForce("cell", Ufl(lambda x: x[0])),
-            r"UFL value of BodyForce on body 'cell' must have shape \(3,\), got \(\): return a vector of 3",
+            r"BodyForce on 'cell' needs shape \(3,\), got \(\): a vector of 3",
         ),
         (
             ThermalStrain("cell", Ufl(lambda x: x)),
-            r"UFL value of ThermalStrain on body 'cell' must have shape \(\), got \(3,\): return a scalar",
+            r"ThermalStrain on 'cell' needs shape \(\), got \(3,\): a scalar",
         ),
     ],
 )
@@ -354,7 +354,7 @@ def test_what_does_not_fit_the_space_is_refused(plane: bool, given: dict[str, An
 def test_a_moment_needs_more_than_a_line() -> None:
     mesh = block((0, 0, 0), (1, 1, 1e-7), (1, 1, 1))
     with pytest.raises(
-        InvalidInputError, match=r"no line, surface 'x1' of body 'cell' is 1.0e-07 times as wide"
+        InvalidInputError, match=r"surface 'x1' of 'cell' must not be a line for a moment: choose"
     ):
         nodal(mesh, TotalForce("cell", "x1", (0.0, 0.0, 0.0), moment=(0.0, 1.0, 0.0)))
 

@@ -124,15 +124,15 @@ def test_a_consistent_model_passes(cell: str) -> None:
     [
         (
             one_too_few,
-            r"must hold every motion without energy, that of Model has [25] modes and a \w+ has [36]",
+            r"the kernel of Model has [25] modes, a \w+ [36]: complete kernel",
         ),
         (
             one_too_many,
-            r"must hold motions without energy alone, that of material Model does not .*annihilates",
+            r"of material Model must hold motions without energy, .*annihilates",
         ),
-        (one_wrong, r"must hold motions without energy alone, that of material Model does not .*annihilates"),
-        (one_twice, r"modes in the kernel of Model must be independent, the [47] given are not: leave out"),
-        (flat, r"kernel\(points\) of Model must return finite modes of shape .* \+ \(n_modes,\), got shape"),
+        (one_wrong, r"of material Model must hold motions without energy, .*annihilates"),
+        (one_twice, r"modes of Model must be independent: leave out"),
+        (flat, r"kernel\(points\) of Model must return finite modes \(\d+, \d\) \+ \(n_modes,\), got \("),
         (no_numbers, r"kernel\(points\) of Model must return finite modes"),
     ],
 )
@@ -143,9 +143,7 @@ def test_a_wrong_kernel_is_refused(claim: Kernel, message: str, cell: str) -> No
 
 @pytest.mark.parametrize("cell", CELLS)
 def test_a_stress_without_an_energy_is_refused(cell: str) -> None:
-    with pytest.raises(
-        InvalidInputError, match=r"stiffness of a material must be symmetric, that of Model is not"
-    ):
+    with pytest.raises(InvalidInputError, match=r"stiffness of Model must be symmetric, is not by"):
         prepare(Model(one_sided=1e-6), cell)
 
 
@@ -160,9 +158,7 @@ def test_a_negative_energy_is_refused(cell: str) -> None:
 @pytest.mark.parametrize("cell", CELLS)
 def test_a_motion_that_the_material_does_not_resist_must_be_in_the_kernel(cell: str) -> None:
     """Without shear stiffness a body has more than rigid motions."""
-    with pytest.raises(
-        InvalidInputError, match=r"must hold every motion without energy, that of Model has [36]"
-    ):
+    with pytest.raises(InvalidInputError, match=r"the kernel of Model has [36] modes, a"):
         prepare(Model(shear=0.0), cell)
 
 
@@ -175,7 +171,7 @@ def test_a_material_without_stiffness_is_refused() -> None:
             return MaterialResponse(gradient * 0.0, np.zeros((len(gradient), 3, 3, 3, 3)), history)
 
     bar = Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), Limp())
-    with pytest.raises(InvalidInputError, match="must resist strain, the stiffness of Limp is zero: check"):
+    with pytest.raises(InvalidInputError, match="the stiffness of Limp must not be zero: check"):
         FormLibrary(MPI.COMM_SELF).prepare(Scene({"bar": bar}))
 
 
@@ -194,7 +190,7 @@ def test_parameters_must_be_a_sequence() -> None:
 
 def test_an_infinite_stiffness_is_refused() -> None:
     with pytest.raises(
-        InvalidInputError, match=r"NaN or infinity in the stiffness of IsotropicElasticity: check"
+        InvalidInputError, match=r"the stiffness of IsotropicElasticity must be finite, got NaN: check"
     ):
         prepare(IsotropicElasticity(1e308, 0.49), "hexahedron")
 
@@ -213,7 +209,7 @@ def test_a_process_checks_a_material_once_and_an_odd_one_every_time(monkeypatch:
     assert checked == [one, other]
     assert first == pytest.approx([first[0], first[0] * 321 / 123, first[0]], rel=1e-12)
     for _ in range(2):
-        with pytest.raises(InvalidInputError, match="the energy of a material must not be negative"):
+        with pytest.raises(InvalidInputError, match="the energy of Model must not be negative"):
             prepare(odd, "hexahedron")
     assert checked == [one, other, odd, odd]
 
@@ -410,11 +406,11 @@ def test_sound_materials_pass() -> None:
 @pytest.mark.parametrize(
     ("spoilt", "message"),
     [
-        ("tangent", r"at \d of 24 points: dP\[0,1\]/dH\[2,2\] is 0.01 in the tangent and 0 by difference"),
-        ("writing", "respond of Damper must leave its arguments as they are"),
-        ("mean", "respond of Damper must answer for each point by itself"),
-        ("spin", r"the stress of Damper \(finite = False\) must depend on the symmetric part"),
-        ("jumps", "the stress of Damper must be a continuous function"),
+        ("tangent", r"dP\[0,1\]/dH\[2,2\] is 0.01, not 0 \(\d points\)"),
+        ("writing", "respond of Damper must not write into its arguments"),
+        ("mean", "respond of Damper must answer each point alone"),
+        ("spin", r"the stress of Damper must depend on the symmetric part"),
+        ("jumps", "the stress of Damper must be continuous, it jumps"),
     ],
 )
 def test_what_is_wrong_is_named(spoilt: str, message: str) -> None:
@@ -468,20 +464,20 @@ class Own(Hyperelasticity):
     [
         (
             "stress",
-            r"must be free of stress at F = I, the forces on an undeformed cell of Own are .*subtract",
+            r"Own must have no stress at F = I, forces are .*subtract",
         ),
         (
             "root",
-            r"must be finite at F = I and at strains of a few per cent, those of Own are not: check its",
+            r"tangent of Own must be finite at F = I and near it: check its",
         ),
-        ("rotation", r"rotation of the deformed body must not change .* that of Own changes by .* FᵀF"),
+        ("rotation", r"rotation must not change the energy of Own, off by .* FᵀF"),
         (
             "slope",
-            r"must be the derivatives of its energy, the stress of Own differs .*write the energy alone",
+            r"must be derivatives of energy, stress of Own is off by",
         ),
         pytest.param(
             "tangent",
-            r"the tangent of Own differs from the difference quotient by",
+            r"tangent of Own is off by",
             marks=(pytest.mark.slow, pytest.mark.claim),
         ),
     ],
@@ -493,7 +489,7 @@ def test_a_mistake_is_named(mistake: str, message: str) -> None:
 
 def test_scenes_check_their_models_when_forms_are_prepared() -> None:
     patch_of(Body(skew_patch("triangle"), Own()))
-    with pytest.raises(InvalidInputError, match="must be free of stress at F = I"):
+    with pytest.raises(InvalidInputError, match="Own must have no stress at F = I"):
         patch_of(Body(skew_patch("triangle"), Own("stress")))
 
 

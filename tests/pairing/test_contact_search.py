@@ -83,7 +83,7 @@ def test_held_slave_nodes_are_left_out_and_partly_held_ones_stay() -> None:
 
 
 def test_overlapping_bodies_are_refused() -> None:
-    message = "9 nodes of 'cube' lie up to 0.2 inside the master, .* explains .*: move the bodies apart"
+    message = "9 nodes of 'cube' lie up to 0.2 inside the master, .* facets: move them"
     with pytest.raises(InvalidInputError, match=message):
         torn(on_floor(-0.2))
     sunk = stacked(0.1)

@@ -166,7 +166,7 @@ def test_a_load_on_what_nothing_holds_is_refused_where_systems_are_built_by_hand
     scene = replace(cube_on_floor(3), loads=[Traction("cube", "x1", (0.0, 1e-3, 0.0))])
     torn = build_torn_system(scene, decompose(scene, cut(scene, 2), MPI.COMM_SELF))
 
-    with pytest.raises(InfeasibleError, match=r"works .* on a rigid motion that nothing resists"):
+    with pytest.raises(InfeasibleError, match=r"every loaded body must be held, a motion has load"):
         DualSystem(torn)
 
 
@@ -177,7 +177,7 @@ def test_the_next_load_of_the_same_scene_is_checked_too() -> None:
     known = DualSystem(torn)
     pushed = replace(scene, loads=[Traction("cube", "x1", (0.0, 1e-3, 0.0))])
 
-    with pytest.raises(InfeasibleError, match=r"works .* on a rigid motion that nothing resists"):
+    with pytest.raises(InfeasibleError, match=r"every loaded body must be held, a motion has load"):
         DualSystem(build_torn_system(pushed, decomposition, previous=torn), previous=known)
 
 
