@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,7 +16,6 @@ from fenics_contact._base.display import displayed
 from fenics_contact._fem.composition import Composition, composition
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.load_forms import has_work, loaded_cells, region_of
-from fenics_contact._fem.mechanics import FROM_REST, MaterialStep, Mechanics, Response
 from fenics_contact._fem.model_checks import check_kernel, kernel_of
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
@@ -39,6 +38,9 @@ from fenics_contact.feti.nearby import ToleranceIndex
 from fenics_contact.materials.elastic import Material
 from fenics_contact.mesh.collapsed import expanded
 from fenics_contact.mesh.faces import coordinate_rounding, corners_of, match_faces
+
+if TYPE_CHECKING:
+    from fenics_contact._fem.mechanics import Mechanics
 
 
 class LocalOperator(Protocol):
@@ -192,31 +194,15 @@ class MixedMesh(SubdomainMesh):
 
     def answering(self, mechanics: Mechanics) -> Mechanics:
         """Return the mechanics of the dofs by those of dolfinx's."""
-        return _OfHexahedra(self, mechanics)
+        from fenics_contact.feti.several_shapes import OfHexahedra  # of large deformations alone
+
+        return OfHexahedra(self, mechanics)
 
     def _matched(self, body: Body, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         columns = _dolfinx.facet_corners(body.mesh.cell_type)
         faces = body.mesh.cells[self.cells][:, columns].reshape(-1, columns.shape[1])
         here = np.flatnonzero(match_faces(faces, facets) >= 0)
         return here // len(columns), here % len(columns)
-
-
-@dataclass(frozen=True, eq=False)
-class _OfHexahedra:
-    """`Mechanics` of a mesh of several shapes of cells by that of its hexahedra."""
-
-    mesh: MixedMesh
-    mechanics: Mechanics
-
-    def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
-        mesh = self.mesh
-        origin = None if step.origin is None else mesh.on_space(step.origin)
-        response = self.mechanics.at(mesh.on_space(displacement), replace(step, origin=origin))
-        force = mesh.force_of(response.force)
-        return replace(response, force=force).with_matrices(mesh.matrix_of)
-
-    def least_jacobian(self, displacement: np.ndarray) -> float:
-        return self.mechanics.least_jacobian(self.mesh.on_space(displacement))
 
 
 @displayed

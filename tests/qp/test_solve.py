@@ -201,7 +201,7 @@ def test_a_gap_between_supports_excuses_errors_of_its_own_point_alone():
 
     assert natural(other, supported) == pytest.approx((1e-3, 1.0), rel=2e-3)
     assert natural(held, supported) == pytest.approx((0.0, 1.0), rel=2e-3)
-    assert natural(other, None) == pytest.approx((0.0, 100.0))
+    assert natural(other, np.zeros(layout.size, dtype=bool)) == pytest.approx((0.0, 100.0))
 
 
 @pytest.mark.parametrize("one", range(4))
