@@ -35,6 +35,10 @@ class Composition:
             return self.materials == other.materials and self.cells is other.cells
         return all(np.array_equal(cells, other.cells[tag]) for tag, cells in self.cells.items())
 
+    def cells_of(self, tag: int, count: int) -> np.ndarray:
+        """Return the cells of a material, of ``count`` on the mesh."""
+        return np.arange(count) if self.cells is None else self.cells[tag]
+
     @property
     def parameters(self) -> tuple[float, ...]:
         """Values of the constants of `integrate`."""

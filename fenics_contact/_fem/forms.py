@@ -137,21 +137,22 @@ class FormLibrary:
         self, parts: Composition, element: Element, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
     ) -> Mechanics:
         """Return forces and tangent of the materials ``parts`` on one mesh of a scene with nonlinear ones."""
-        from fenics_contact._fem.mechanics import HyperelasticMechanics, LinearMechanics
+        from fenics_contact._fem.mechanics import (
+            HistoryMechanics,
+            HyperelasticMechanics,
+            LinearMechanics,
+            MixedMechanics,
+        )
 
         if not any(self.varies(material, element) for material in parts.materials):
             points = points - points[0]  # as exact far from the origin as near it
         if not any(map(is_nonlinear, parts.materials)):
             return LinearMechanics(self.stiffness(parts, element, space), space.mesh, points)
         remembering = [isinstance(material, HistoryMaterial) for material in parts.materials]
-        others = None
-        if not all(remembering):
-            others = HyperelasticMechanics(self._templates, parts, element, space, points)
-        if others is not None and not any(remembering):
-            return others
-        from fenics_contact._fem.mechanics import HistoryMechanics
-
-        return HistoryMechanics(parts, element, space, points, others)
+        if all(remembering):
+            return HistoryMechanics(parts, element, space, points)
+        others = HyperelasticMechanics(self._templates, parts, element, space, points)
+        return MixedMechanics(parts, element, space, points, others) if any(remembering) else others
 
     def following(
         self,

@@ -20,6 +20,7 @@ from fenics_contact._fem.templates import (
 from fenics_contact._kinematics.base import Gradients
 from fenics_contact._kinematics.element import Element
 from fenics_contact.materials.hyperelastic import has_mean_dilatation
+from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.cell_types import quadrature, shape_gradients, shape_values
 from fenics_contact.mesh.quality import determinants
 
@@ -63,7 +64,22 @@ def held_share(moduli: np.ndarray) -> float:
     return float(np.sqrt(min(1.0, HELD * shear / bulk)))
 
 
-class MeanStrain:
+class PointStrain:
+    """Displacement gradients as they are at each point."""
+
+    def averaged(self, tensors: np.ndarray) -> np.ndarray:
+        """Return H itself."""
+        return tensors
+
+    def added(self, blocks: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+        """Return ∫ ∇v : A : ∇u of the cells as it is."""
+        return blocks
+
+
+POINT_STRAIN = PointStrain()
+
+
+class MeanStrain(PointStrain):
     """Displacement gradients of small strain whose traces are the projections of their cells: B-bar.
 
     H̄ = H + (1 − s) (Π tr H − tr H) I / 3 with the projection Π on the polynomials of each cell, its mean or
@@ -88,6 +104,10 @@ class MeanStrain:
     def _apart(self, traces: np.ndarray) -> np.ndarray:
         """Return what a third of traces lacks of their projections, shape (n_cells, n_gauss, k)."""
         return self._part / 3.0 * (self._polynomials.projected(traces) - traces)
+
+    def added(self, blocks: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+        """Return ∫ ∇v̄ : A : ∇ū of the cells by ∫ ∇v : A : ∇u, in one row."""
+        return np.asarray(blocks + self.blocks(tangent).ravel())
 
     def blocks(self, tangent: np.ndarray) -> np.ndarray:
         """Return what ∫ ∇v̄ : A : ∇ū has beside ∫ ∇v : A : ∇u, shape (n_cells, dim nodes, dim nodes)."""
@@ -138,31 +158,37 @@ class GaussPoints:
         nodal = self._gradients.part(cells).force(self._weights[cells], stress)
         return np.bincount(self._dofs[cells].ravel(), nodal.ravel(), minlength=int(np.prod(self._shape)))
 
+    def strain_of(self, material: HistoryMaterial, cells: np.ndarray) -> PointStrain:
+        """Return the strain of a material in some cells."""
+        return self.mean_strain(cells, material.moduli) if has_mean_dilatation(material) else POINT_STRAIN
+
     def mean_strain(self, cells: np.ndarray, moduli: np.ndarray) -> MeanStrain:
         """Return the means of changes of volume in some cells."""
         share = held_share(moduli) if self._element.cells in UNSEEN else 0.0
         return MeanStrain(self._gradients.part(cells), self._polynomials.of(cells), share)
 
     def stiffness(
-        self, tangent: np.ndarray, cells: np.ndarray, means: MeanStrain | None = None
+        self, tangent: np.ndarray, cells: np.ndarray, strain: PointStrain = POINT_STRAIN
     ) -> np.ndarray:
         """Return ∫ ∇v : A : ∇u over some cells: entries of the matrix of `assembled`."""
-        entries = self._gradients.part(cells).blocks(self._weights[cells], tangent).ravel()
-        if means is not None:
-            entries = entries + means.blocks(tangent).ravel()
+        blocks = self._gradients.part(cells).blocks(self._weights[cells], tangent).ravel()
+        entries = strain.added(blocks, tangent)
         _, _, places = self._pattern
         return np.bincount(places[cells].ravel(), entries, minlength=self.entries)
 
-    def assembled(self, entries: np.ndarray, others: sp.csr_matrix | None = None) -> sp.csr_matrix:
+    def assembled(self, entries: np.ndarray) -> sp.csr_matrix:
         """Return the matrix with entries from `stiffness`; its pattern is the same whatever is zero in it."""
         indptr, indices, _ = self._pattern
-        size = len(indptr) - 1
-        if others is not None:
-            rows = np.repeat(np.arange(size), np.diff(others.indptr))
-            own = np.repeat(np.arange(size), np.diff(indptr)) * size + indices
-            entries = entries.copy()
-            entries[np.searchsorted(own, rows * size + others.indices)] += others.data
-        return sp.csr_matrix((entries, indices, indptr), shape=(size, size))
+        return sp.csr_matrix((entries, indices, indptr), shape=(len(indptr) - 1,) * 2)
+
+    def with_others(self, entries: np.ndarray, others: sp.csr_matrix) -> np.ndarray:
+        """Return entries from `stiffness` with those of another matrix on the same mesh."""
+        indptr, indices, _ = self._pattern
+        size, entries = len(indptr) - 1, entries.copy()
+        rows = np.repeat(np.arange(size), np.diff(others.indptr))
+        own = np.repeat(np.arange(size), np.diff(indptr)) * size + indices
+        entries[np.searchsorted(own, rows * size + others.indices)] += others.data
+        return entries
 
     @property
     def entries(self) -> int:
@@ -202,7 +228,25 @@ def mean_fields(mesh: _dolfinx.mesh.Mesh, element: Element) -> list[_dolfinx.fem
     return [_dolfinx.fem.Function(_dolfinx.cellwise_space_on(mesh, each)) for each in shapes]
 
 
-class MeanDilatation:
+class PointDilatation:
+    """Dilatations as they are at each point."""
+
+    def follow(self, displacement: np.ndarray) -> None:
+        """Set nothing."""
+
+    def foresee(self, origin: np.ndarray, displacement: np.ndarray) -> None:
+        """Set nothing."""
+
+    def added(self, stiffness: sp.csr_matrix) -> sp.csr_matrix:
+        """Return a tangent as it is."""
+        return stiffness
+
+    def least(self, displacement: np.ndarray) -> float:
+        """Return that none is smaller than at the points."""
+        return np.inf
+
+
+class MeanDilatation(PointDilatation):
     """The dilatations θ in the cells of one mesh, which are polynomials, and their part of the tangent.
 
     With the polynomials ψ_i of a cell and M_ij = ∫ ψ_i ψ_j, the coefficients of θ = Π J and p = Π U'(θ) are
@@ -261,10 +305,10 @@ class MeanDilatation:
         possible = np.all(points > flattened * reached, axis=1)
         self._set(np.where(possible[:, None], foreseen, actual))
 
-    def stiffness(self) -> sp.csr_matrix:
-        """Return the growth of the stresses with the dilatations, shape (dim n, dim n)."""
+    def added(self, stiffness: sp.csr_matrix) -> sp.csr_matrix:
+        """Return a tangent with the growth of the stresses with the dilatations, shape (dim n, dim n)."""
         D = self._inverse @ self._volume_changes()
-        return (D.T @ assembled(self._modulus, (D.shape[0],) * 2) @ D).tocsr()
+        return (stiffness + (D.T @ assembled(self._modulus, (D.shape[0],) * 2) @ D).tocsr()).tocsr()
 
     def least(self, displacement: np.ndarray) -> float:
         """Return the smallest θ at a Gauss point."""
@@ -291,7 +335,5 @@ class MeanDilatation:
 
 def _own_cells(parts: Composition, count: int) -> np.ndarray:
     """Return the cells of materials with a mean dilatation."""
-    if parts.cells is None:
-        return np.arange(count)
     tagged = enumerate(parts.materials, start=1)
-    return np.concatenate([parts.cells[tag] for tag, material in tagged if has_mean_dilatation(material)])
+    return np.concatenate([parts.cells_of(tag, count) for tag, each in tagged if has_mean_dilatation(each)])

@@ -16,13 +16,20 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.composition import Composition, material_sets
 from fenics_contact._fem.deformed_forms import FORMS, have_mean_energy, prepare_forms
 from fenics_contact._fem.heated import heat_expands
-from fenics_contact._fem.kinematics import Dilatation, GaussPoints, MeanDilatation, assembled, mean_fields
+from fenics_contact._fem.kinematics import (
+    Dilatation,
+    GaussPoints,
+    MeanDilatation,
+    PointDilatation,
+    assembled,
+    mean_fields,
+)
 from fenics_contact._fem.templates import Templates, quadrature_degree
 from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlinear
+from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature
 from fenics_contact.mesh.quality import determinants
@@ -153,15 +160,10 @@ class Mechanics(Protocol):
 
 
 class HistoryMechanics:
-    """`Mechanics` of materials with a history; others on the same mesh are added."""
+    """`Mechanics` of materials with a history."""
 
     def __init__(
-        self,
-        parts: Composition,
-        element: Element,
-        space: _dolfinx.fem.FunctionSpace,
-        points: np.ndarray,
-        others: Mechanics | None,
+        self, parts: Composition, element: Element, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
     ) -> None:
         """Evaluate shape functions."""
         nodes, dofs = self._blocks = _dolfinx.node_dofs(space)
@@ -169,10 +171,8 @@ class HistoryMechanics:
         by_block[dofs] = points[nodes]
         self._gauss = GaussPoints(space, element, by_block)
         self._dilatation = Dilatation(space, element, by_block)
-        self._others = others
-        every = np.arange(self._gauss.shape[0])
         self._parts = [
-            (material, every if parts.cells is None else parts.cells[tag])
+            (material, parts.cells_of(tag, self._gauss.shape[0]))
             for tag, material in enumerate(parts.materials, start=1)
             if isinstance(material, HistoryMaterial)
         ]
@@ -185,6 +185,10 @@ class HistoryMechanics:
 
     def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
         """Evaluate the materials and assemble; see `Mechanics.at`."""
+        return self._answered(displacement, step)[0]
+
+    def _answered(self, displacement: np.ndarray, step: MaterialStep) -> tuple[Response, np.ndarray]:
+        """Return the response, and the entries of its tangent."""
         before, gradient = self._before(step.history), self._gauss.gradient(displacement)
         after, stress = before.copy(), np.full(gradient.shape, np.nan)
         force, entries = np.zeros(displacement.size), np.zeros(self._gauss.entries)
@@ -193,16 +197,12 @@ class HistoryMechanics:
             if not len(cells):
                 continue
             shape, size = (len(cells), gradient.shape[1]), material.history_size
-            means = None
-            if has_mean_dilatation(material):
-                means = self._gauss.mean_strain(cells, material.moduli)
+            strain = self._gauss.strain_of(material, cells)
             given, stretch = _without_expansion(
                 material, gradient[cells], None if heat is None else heat[cells]
             )
-            if means is not None:
-                given = means.averaged(given)
             end = material.answer(
-                given.reshape(-1, 3, 3),
+                strain.averaged(given).reshape(-1, 3, 3),
                 before[cells, :, :size].reshape(shape[0] * shape[1], size),
                 step.duration,
                 None if heat is None else heat[cells].ravel(),
@@ -210,21 +210,21 @@ class HistoryMechanics:
             after[cells, :, :size] = end.history.reshape(*shape, size)
             nominal = stretch**2 * end.stress.reshape(*shape, 3, 3)
             stress[cells] = cauchy(nominal, gradient[cells]) if material.finite else nominal
-            force += self._gauss.force(nominal if means is None else means.averaged(nominal), cells)
+            force += self._gauss.force(strain.averaged(nominal), cells)
             tangent = stretch[..., None, None] * end.tangent.reshape(*shape, 3, 3, 3, 3)
             if not material.symmetric:
                 tangent = 0.5 * (tangent + tangent.transpose(0, 1, 4, 5, 2, 3))
-            entries += self._gauss.stiffness(tangent, cells, means)
-        rest = None if self._others is None else self._others.at(displacement, step)
-        return Response(
-            force=force if rest is None else force + rest.force,
-            tangent=lambda: self._gauss.assembled(entries, None if rest is None else rest.stiffness),
+            entries += self._gauss.stiffness(tangent, cells, strain)
+        response = Response(
+            force=force,
+            tangent=lambda: self._gauss.assembled(entries),
             energy=None,
             least_jacobian=self.least_jacobian(displacement),
             history=after,
             stress=stress,
-            by_stress=partial(self._by_stress, gradient, stress) if rest is None else None,
+            by_stress=partial(self._by_stress, gradient, stress),
         )
+        return response, entries
 
     def _by_stress(self, gradient: np.ndarray, stress: np.ndarray) -> sp.csr_matrix:
         """Return ∫ ∇v S : ∇u, S = det F F⁻¹σF⁻ᵀ; see `Response.by_stress`."""
@@ -257,6 +257,32 @@ class HistoryMechanics:
                 f"the history must have shape {self.history_shape}, got {history.shape}: start with None"
             )
         return history
+
+
+class MixedMechanics(HistoryMechanics):
+    """`Mechanics` of materials with a history and of others on the same mesh."""
+
+    def __init__(
+        self,
+        parts: Composition,
+        element: Element,
+        space: _dolfinx.fem.FunctionSpace,
+        points: np.ndarray,
+        others: Mechanics,
+    ) -> None:
+        """Evaluate shape functions."""
+        super().__init__(parts, element, space, points)
+        self._others = others
+
+    def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
+        """Add what the others answer; see `Mechanics.at`."""
+        own, entries = self._answered(displacement, step)
+        rest = self._others.at(displacement, step)
+
+        def tangent() -> sp.csr_matrix:
+            return self._gauss.assembled(self._gauss.with_others(entries, rest.stiffness))
+
+        return replace(own, force=own.force + rest.force, tangent=tangent, by_stress=None)
 
 
 def _without_expansion(
@@ -318,7 +344,7 @@ class HyperelasticMechanics:
             )
             for number, kind in enumerate(FORMS)
         )
-        self._mean: MeanDilatation | None = None
+        self._mean = PointDilatation()
         if have_mean_energy(parts.materials):
             self._mean = MeanDilatation(templates, parts, element, fields, self._dilatation)
 
@@ -327,8 +353,7 @@ class HyperelasticMechanics:
         _dolfinx.update_coordinates(self._mesh, self._points)
         self._displacement.x.array[:] = displacement
         self._set_heat(step.temperature)
-        if self._mean is not None:
-            self._mean.follow(displacement)
+        self._mean.follow(displacement)
         force, energy = _dolfinx.assemble_vector(self._force), _dolfinx.assemble_scalar(self._energy)
         tangent = partial(self._stiffness, displacement.copy(), step)
         return Response(force, tangent, energy, self.least_jacobian(displacement))
@@ -348,20 +373,17 @@ class HyperelasticMechanics:
         """
         _dolfinx.update_coordinates(self._mesh, self._points)
         self._set_heat(step.temperature)
-        origin = step.origin
-        if self._mean is not None and origin is not None:
-            self._displacement.x.array[:] = origin
-            self._mean.foresee(origin, displacement)
-        elif self._mean is not None:
+        if step.origin is None:
             self._mean.follow(displacement)
+        else:
+            self._displacement.x.array[:] = step.origin
+            self._mean.foresee(step.origin, displacement)
         self._displacement.x.array[:] = displacement
-        stiffness = assembled(self._tangent, (displacement.size,) * 2)
-        return stiffness if self._mean is None else (stiffness + self._mean.stiffness()).tocsr()
+        return self._mean.added(assembled(self._tangent, (displacement.size,) * 2))
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
         """Return the smallest det F; see `Mechanics.least_jacobian`."""
-        least = self._dilatation.least(displacement)
-        return least if self._mean is None else min(least, self._mean.least(displacement))
+        return min(self._dilatation.least(displacement), self._mean.least(displacement))
 
 
 def prepare_mechanics(templates: Templates, scene: Scene) -> None:

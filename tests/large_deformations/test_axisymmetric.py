@@ -119,7 +119,7 @@ def test_tangent_of_metal_is_that_of_its_force(kind: Kind, metal: HistoryMateria
     own = _dolfinx.local_mesh(mesh.points, mesh.cells, mesh.cell_type)
     space = _dolfinx.coefficient(own, "u").function_space
     element = Element(mesh.cell_type, Revolution())
-    mechanics = HistoryMechanics(Composition((metal,)), element, space, mesh.points, None)
+    mechanics = HistoryMechanics(Composition((metal,)), element, space, mesh.points)
     u = 0.05 * np.sin(1.7 * np.arange(mesh.points.size) ** 1.3)
     way = np.cos(np.arange(u.size) ** 1.5)
     ahead, behind = (mechanics.at(u + sign * 1e-6 * way).force for sign in (1, -1))
@@ -133,7 +133,7 @@ def test_force_of_metal_without_yield_is_that_of_the_linear_form() -> None:
     own = _dolfinx.local_mesh(mesh.points, mesh.cells, mesh.cell_type)
     space = _dolfinx.coefficient(own, "u").function_space
     element = Element(mesh.cell_type, Revolution())
-    mechanics = HistoryMechanics(Composition((metal,)), element, space, mesh.points, None)
+    mechanics = HistoryMechanics(Composition((metal,)), element, space, mesh.points)
     scene = Scene({"disc": Body(mesh, metal, axisymmetric=True)})
     forms = FormLibrary(MPI.COMM_SELF)
     forms.prepare(scene)
