@@ -39,7 +39,7 @@ from fenics_contact._optimize.problem import (
     evaluate_constraint,
     pose,
 )
-from fenics_contact._optimize.progress import Callback, Progress
+from fenics_contact._optimize.progress import Callback, Progress, StoredProgress
 from fenics_contact._optimize.result import MethodState, NotConvergedError, Reason, Record, Result, StepKind
 from fenics_contact._optimize.subproblem import Step, Trial, Trust, solve_step
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
@@ -257,7 +257,9 @@ class BundleTrust:
             InvalidInputError: If the checkpoint cannot be used.
             CheckpointError: If the checkpoint cannot be written.
         """
-        progress, run = Progress(checkpoint, self, problem, callback), _Run(self, problem)
+        progress, run = Progress(self, problem, callback), _Run(self, problem)
+        if checkpoint is not None:
+            progress = StoredProgress(checkpoint, self, problem, callback)
         with progress.reporting() as task:
             state, reason = run.to_the_stop(progress)
             task.outcome = reason.name.lower().replace("_", " ")
@@ -286,7 +288,7 @@ class _Run:
                 reason = Reason.STEP_FAILED
             if reason is None:
                 progress.evaluated(state)
-        progress.keep(state, last=True)
+        progress.keep_last(state)
         return state, reason
 
     def start(self) -> MethodState:

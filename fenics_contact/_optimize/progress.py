@@ -57,6 +57,21 @@ class Resumable(Function, Protocol):
         """Continue from what `memory` returned, possibly in another process. Collective."""
 
 
+class _Forgetful:
+    """The memory of a function whose values depend on no earlier ones."""
+
+    comm: MPI.Comm | None = None
+
+    def fingerprint(self) -> Mapping[str, str]:
+        return {}
+
+    def memory(self) -> Mapping[str, NDArray[Any]]:
+        return {}
+
+    def recall(self, memory: Mapping[str, NDArray[Any]]) -> None:
+        pass
+
+
 class Method(Protocol):
     """Parameters of a method, a dataclass."""
 
@@ -75,19 +90,11 @@ class Method(Protocol):
 
 
 class Progress:
-    """Stores a minimisation in its checkpoint, if it has one, and reports its progress."""
+    """Reports the progress of a minimisation, of which nothing is stored."""
 
-    def __init__(
-        self,
-        checkpoint: Checkpoint | None,
-        method: Method,
-        problem: CheckedProblem,
-        callback: Callback | None,
-    ) -> None:
-        """Describe the problem; nothing is read or written yet."""
-        self._checkpoint, self._written = checkpoint, -1
-        self._method, self._callback = method, callback
-        self._state: MethodState | None = None
+    def __init__(self, method: Method, problem: CheckedProblem, callback: Callback | None) -> None:
+        """Describe the problem."""
+        self._method, self._callback, self._evaluations = method, callback, 0
         self._task = Task(
             "optimisation",
             unit="evaluations",
@@ -96,30 +103,12 @@ class Progress:
             measured="decrease",
         )
         self._constrained = bool(problem.nonlinear)
-        self._fun = problem.fun if isinstance(problem.fun, Resumable) else None
-        self.comm = None if checkpoint is None else checkpoint.comm
-        if self.comm is None and self._fun is not None:
-            self.comm = self._fun.comm
-        if checkpoint is None:
-            return
-        self._fingerprint = _fingerprint(method, problem)
-        if self._fun is not None:
-            self._fingerprint.update(self._fun.fingerprint())
+        self._fun = problem.fun if isinstance(problem.fun, Resumable) else _Forgetful()
+        self.comm = self._fun.comm
 
     def recalled(self) -> MethodState | None:
         """Return the stored state, None where the run starts anew. Collective."""
-        if self._checkpoint is None:
-            return None
-        stored = self._checkpoint.read(KIND, self._fingerprint, self.comm)
-        if stored is None:
-            return None
-        if self._fun is not None:
-            names = [name for name in stored if name.startswith(_OF_FUN)]
-            self._fun.recall({name.removeprefix(_OF_FUN): stored.pop(name) for name in names})
-        state = MethodState.from_arrays(stored)
-        self._written = state.evaluations
-        self._tell(state)
-        return state
+        return None
 
     @contextmanager
     def reporting(self) -> Iterator[Task]:
@@ -138,35 +127,69 @@ class Progress:
             with nullcontext() if self.comm is None else _asking(self.comm):
                 self._callback(state.history[-1], state.centre.x.copy())
         self.keep(state)
-        safe_point(self._summary, lambda: self.keep(state, last=True), self.comm)
+        safe_point(self._summary, lambda: self.keep_last(state), self.comm)
 
     def _tell(self, state: MethodState) -> None:
-        self._state, record = state, state.history[-1]
+        self._evaluations, record = state.evaluations, state.history[-1]
         size = self._method.size_of(state.history[0].value) + abs(record.best)
         predicted = record.predicted_decrease / size
         words = f"violation {record.violation:.1e}" if self._constrained else ""
         measure = predicted or None
         self._task.step(record.evaluations, measure=measure, value=record.best, words=words)
 
-    def keep(self, state: MethodState, *, last: bool = False) -> None:
+    def keep(self, state: MethodState) -> None:
         """Write the state if that is due. Collective."""
-        if self._checkpoint is None:
+
+    def keep_last(self, state: MethodState) -> None:
+        """Write the state of the end if that has not been done. Collective."""
+
+    def _summary(self) -> str:
+        """Describe what a run that ends now leaves, and how to continue it."""
+        return without_checkpoint(counted(self._evaluations, "evaluation"))
+
+
+class StoredProgress(Progress):
+    """Stores a minimisation in a checkpoint, and reports its progress."""
+
+    def __init__(
+        self, checkpoint: Checkpoint, method: Method, problem: CheckedProblem, callback: Callback | None
+    ) -> None:
+        """Describe the problem; nothing is read or written yet."""
+        super().__init__(method, problem, callback)
+        self._checkpoint, self._written = checkpoint, -1
+        if checkpoint.comm is not None:
+            self.comm = checkpoint.comm
+        self._fingerprint = {**_fingerprint(method, problem), **self._fun.fingerprint()}
+
+    def recalled(self) -> MethodState | None:
+        """Return the stored state, None where the run starts anew. Collective."""
+        stored = self._checkpoint.read(KIND, self._fingerprint, self.comm)
+        if stored is None:
+            return None
+        names = [name for name in stored if name.startswith(_OF_FUN)]
+        self._fun.recall({name.removeprefix(_OF_FUN): stored.pop(name) for name in names})
+        state = MethodState.from_arrays(stored)
+        self._written = state.evaluations
+        self._tell(state)
+        return state
+
+    def keep(self, state: MethodState) -> None:
+        """Write the state if that is due. Collective."""
+        self._keep_after(state, self._checkpoint.every)
+
+    def keep_last(self, state: MethodState) -> None:
+        """Write the state of the end if that has not been done. Collective."""
+        self._keep_after(state, 1)
+
+    def _keep_after(self, state: MethodState, evaluations: int) -> None:
+        if 0 <= self._written and state.evaluations < self._written + evaluations:
             return
-        due = 0 if last else self._checkpoint.every - 1
-        if 0 <= self._written and state.evaluations <= self._written + due:
-            return
-        arrays = state.arrays()
-        if self._fun is not None:
-            memory = self._fun.memory()
-            arrays.update({f"{_OF_FUN}{name}": value for name, value in memory.items()})
+        arrays, memory = state.arrays(), self._fun.memory()
+        arrays.update({f"{_OF_FUN}{name}": value for name, value in memory.items()})
         self._checkpoint.write(KIND, self._fingerprint, arrays, self.comm)
         self._written = state.evaluations
 
     def _summary(self) -> str:
-        """Describe what a run that ends now leaves, and how to continue it."""
-        if self._checkpoint is None:
-            evaluations = 0 if self._state is None else self._state.evaluations
-            return without_checkpoint(counted(evaluations, "evaluation"))
         written = max(self._written, 0)
         return self._checkpoint.resume_hint(written, counted(written, "evaluation"))
 
