@@ -71,14 +71,14 @@ class DeformedEquilibria:
         decomposition: Decomposition,
         steps: AutomaticSteps | None,
         timer: PhaseTimer,
-        known: DeformedEquilibria | None = None,
+        assembled: TornSystem | None = None,
     ) -> None:
         """Prepare the forms of all materials. Collective."""
         _require_elastic(scene)
         self.scene, self._steps = scene, steps or AutomaticSteps()
         self.decomposition, self._timer = decomposition, timer
         self._equations = Equations(scene, decomposition)
-        self._assembled: TornSystem | None = None if known is None else known._assembled
+        self.assembled = assembled
         self._unresisted: tuple[UnheldMotion, ...] | None = None
         self._places = InFacets.none(scene.dim)
 
@@ -283,8 +283,8 @@ class DeformedEquilibria:
         self, scene: Scene, time: float, step: LoadStep = ONLY_STEP, overlap: bool = False
     ) -> Loading:
         """Return what acts at a time. Collective."""
-        load = Loading.of(scene, self.decomposition, time, self._assembled, step=step, overlap=overlap)
-        self._assembled = load.torn
+        load = Loading.of(scene, self.decomposition, time, self.assembled, step=step, overlap=overlap)
+        self.assembled = load.torn
         if scene.deforms_much:
             return load
         return replace(load, torn=with_places(load.torn, self._places.by_number(load.torn.points)))
@@ -383,8 +383,8 @@ def moved_as(at: Configuration, acted: Loading, load: Loading, contact: Contact)
     last = {each.place: each for each in acted.turned}
     turned = []
     for each in load.turned:
-        known = last.get(each.place)
-        held = np.zeros_like(each.load) if known is None else np.where(each.free, known.load, 0.0)
+        known = last.get(each.place, each.at_rest)
+        held = np.where(each.free, known.load, 0.0)
         motion = at.motions.get(each.place, np.zeros_like(each.motion))
         turned.append(replace(each, motion=motion, load=held))
     acted = acted.with_surfaces(tuple(turned))

@@ -17,6 +17,7 @@ from fenics_contact._equilibrium.other_rows import (
 from fenics_contact._equilibrium.starts import NoStart, checked_start
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.torn import TornSystem, build_torn_system, with_points_inside
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.results.dual_solve import sticking
@@ -61,6 +62,17 @@ class Equilibria(Protocol):
 
     def restored(self, stored: Stored, scene: Scene, known: State | None) -> AnyState:
         """Build a state from what was stored of it. Collective; `known`: of which parts may be reused."""
+
+
+class NoEquilibria:
+    """What finds no equilibria, as none have been looked for."""
+
+    #: The last system, of which parts may be reused.
+    assembled: TornSystem | None = None
+
+    def serves(self, scene: Scene, decomposition: Decomposition) -> bool:
+        """Return whether a scene has the meshes, the held components and the contact pairs of these."""
+        return False
 
 
 class Undeformed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -24,11 +25,12 @@ from fenics_contact._large_deformations.moving_contact import (
 )
 from fenics_contact._large_deformations.rigid_surfaces import (
     Motions,
+    TurnedSurface,
     placed,
     spring_columns,
     tracked_stiffness,
 )
-from fenics_contact._large_deformations.tangent import TangentSystem, linearised
+from fenics_contact._large_deformations.tangent import TangentOperator, TangentSystem, linearised
 from fenics_contact._large_deformations.tangent_step import TangentProblem
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import ConvergenceError, together
@@ -208,13 +210,20 @@ class ResidualState:
                     f"of {self.least_jacobian:.2g}: take smaller load steps, or check its energy or stress"
                 )
 
-    def linearised(
-        self, timer: PhaseTimer, known: Linearisation | None, *, springs: bool = True
+    def linearised(self, timer: PhaseTimer, known: Linearisation | None) -> Linearisation:
+        """Factor the tangents, with those of springs of tools. Collective."""
+        sprung = self.load.turned if self.load.is_tracked else ()
+        return self._factored(timer, {} if known is None else known.system.operators, sprung)
+
+    def linearised_without_springs(self, timer: PhaseTimer) -> Linearisation:
+        """Factor the tangents without those of springs of tools. Collective."""
+        return self._factored(timer, {}, ())
+
+    def _factored(
+        self, timer: PhaseTimer, earlier: Mapping[int, TangentOperator], sprung: Sequence[TurnedSurface]
     ) -> Linearisation:
-        """Factor the tangents, with those of springs of tools or without. Collective."""
         self._require_finite_tangents()
         uneven = self.growth.unsymmetric(self.torn.decomposition, self.load.rim)
-        sprung = self.load.turned if self.load.is_tracked and springs else ()
         held = SymmetricLowRank(*spring_columns(sprung, self.contact.prescribed.size))
         turning = self.contact.turning(self.at.multiplier, uneven, held)
         torn, further = self.torn, NO_ROWS
@@ -232,7 +241,6 @@ class ResidualState:
         diagonal = self.at.diagonal
         if diagonal is not None:
             diagonal = np.concatenate([diagonal, np.ones(further.count)])
-        earlier = {} if known is None else known.system.operators
         by_stress = {
             subdomain.mesh.number: response.by_stress
             for subdomain, response in zip(torn.subdomains, self.responses, strict=True)
@@ -309,10 +317,10 @@ class Equations:
         there = torn.free_imbalance(multiplier)
         return np.append(unbalanced, there) if self.decomposition.comm.rank == 0 else unbalanced
 
-    def _foundations(self, scene: Scene) -> tuple[sp.csr_matrix | None, ...]:
-        """Return the stiffness of the foundations under each subdomain, None where there is none."""
+    def _foundations(self, scene: Scene) -> tuple[_NoBed, ...]:
+        """Return the foundations under each subdomain."""
         beds = (foundation_of(m, scene.bodies[m.body], scene.foundations) for m in self.decomposition.meshes)
-        return tuple(bed if bed.nnz else None for bed in beds)
+        return tuple(_Bed(bed) if bed.nnz else _NoBed() for bed in beds)
 
     def _facts(self) -> dict[str, object]:
         return {"subdomains": f"{len(self._mechanics)} on this rank"}
@@ -378,7 +386,8 @@ class Equations:
                 for (m, part, history), start, warmer in zip(each, before, heat, strict=True)
             )
             moved = (at.displacement[part] for part in self.decomposition.parts)
-            responses = tuple(map(_on_bed, responses, self._beds, moved))
+            each_bed = zip(self._beds, responses, moved, strict=True)
+            responses = tuple(bed.under(response, own) for bed, response, own in each_bed)
             external, growth = load.at(at.displacement)
             responses = tuple(map(_following, responses, self.decomposition.meshes))
             external = self.decomposition.on_followed(external)
@@ -407,15 +416,26 @@ def _following(response: Response, mesh: SubdomainMesh) -> Response:
     return replace(response, force=following.force(response.force)).with_matrices(following.stiffness)
 
 
-def _on_bed(response: Response, bed: sp.csr_matrix | None, displacement: Vector) -> Response:
-    """Return a response with the springs of foundations, which stay as they are however far they move."""
-    if bed is None:
+class _NoBed:
+    """No foundation under a subdomain."""
+
+    def under(self, response: Response, displacement: Vector) -> Response:
+        """Return a response with the springs of foundations, which stay as they are however far they move."""
         return response
-    force = bed @ displacement
-    energy = None if response.energy is None else response.energy + 0.5 * float(displacement @ force)
-    return replace(
-        response,
-        force=response.force + force,
-        tangent=lambda: (response.stiffness + bed).tocsr(),
-        energy=energy,
-    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Bed(_NoBed):
+    """Foundations under a subdomain."""
+
+    stiffness: sp.csr_matrix
+
+    def under(self, response: Response, displacement: Vector) -> Response:
+        force = self.stiffness @ displacement
+        energy = None if response.energy is None else response.energy + 0.5 * float(displacement @ force)
+        return replace(
+            response,
+            force=response.force + force,
+            tangent=lambda: (response.stiffness + self.stiffness).tocsr(),
+            energy=energy,
+        )

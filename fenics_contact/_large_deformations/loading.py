@@ -234,7 +234,7 @@ class Loading:
         weighted += [(part * weight, each) for weight, each in self.following]
         time = (1.0 - part) * first.time + part * self.time
         before = {each.place: each for each in first.turned}
-        turned = tuple(each.between(before.get(each.place), part) for each in self.turned)
+        turned = tuple(each.between(before, part) for each in self.turned)
         pairs = zip_longest(first.heat, self.heat)
         heat = tuple(_between(one, other, part) for one, other in pairs)
         return Loading(torn, prescribed, time, tuple(weighted), heat=heat).with_surfaces(turned)
@@ -246,7 +246,7 @@ class Loading:
         way round, after a full turn none at all.
         """
         before = {each.place: each for each in first.turned}
-        turns = [each.turn_from(before.get(each.place)) for each in self.turned if each.far]
+        turns = [each.turn_from(before) for each in self.turned if each.far]
         if not turns:
             return 1.0
         ways = np.array([0.0 * turns[0], *turns])
@@ -312,7 +312,7 @@ class Loading:
         torn = replace(
             torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported), free=free
         )
-        still = tuple(each.between(None, 0.0) for each in self.turned)
+        still = tuple(each.at_rest for each in self.turned)
         return Loading(torn, 0.0 * self.prescribed, 0.0, turned=still)
 
     @property
@@ -514,7 +514,7 @@ class RigidStart:
         """Return whether rigid surfaces that all turn alike hold a body, and nothing else does."""
         before = {each.place: each for each in first.turned}
         own = [each for each in last.turned if nodes.start <= each.nodes[0] < nodes.stop]
-        turns = [each.turn_from(before.get(each.place)) for each in own]
+        turns = [each.turn_from(before) for each in own]
         held = ~np.isnan(last.prescribed[nodes]).all(axis=1)
         for each in own:
             held[each.nodes - nodes.start] = each.free.any()

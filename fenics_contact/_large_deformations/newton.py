@@ -263,6 +263,11 @@ class _State:
         """One line for each step."""
         return self.effort.history
 
+    def after(self, line: SolverStep, taken: TangentStep, loose: bool) -> _State:
+        """Return it with another step."""
+        effort = self.effort.followed_by(Effort((line,), taken.products, 1))
+        return replace(self, instead=None, loose=loose, effort=effort)
+
     def is_vain(self, method: TangentNewton) -> bool:
         """Return whether further steps are vain: residuals do not fall, or bodies lose stability meanwhile.
 
@@ -323,9 +328,10 @@ class _Run:
         evaluation = near.of(state.evaluation)
         begin = state.begin if state.history else replace(state.begin, softened=near.system.softened)
         state = replace(state, evaluation=evaluation, near=near, pace=pace, begin=begin)
+        held = [f"{near.system.softened} soft motions held"] if near.system.softened else []
         # (b), (c) The face and its linear system.
         with self.timer.phase("solve"):
-            taken, near, whole = self._solved(state)
+            taken, near, whole = self._solved(state, near)
             change = taken.multiplier[: len(evaluation.at.multiplier)] - evaluation.at.multiplier
             further = taken.multiplier[len(change) :]
             moved = near.system.displacement(np.concatenate([change, further]), taken.motions)
@@ -335,19 +341,15 @@ class _Run:
         turned = taken.motions[len(taken.motions) - evaluation.torn.free.count :][:tracked]
         damped = self._damped(state, moved, change, turned)
         # (e) The next state, or the other start if the first step has failed.
-        line = self._line(state, damped, taken, whole)
-        promising = damped.fraction == 1.0 and line.residuals.worst < evaluation.residuals.worst
-        again = state.instead if not promising else None
-        if again is not None:
-            line = replace(line, note=f"{line.note}, begun again")
-        loose = whole and self._forces_known(evaluation)
-        effort = state.effort.followed_by(Effort((line,), taken.products, 1))
-        state = replace(state, instead=None, loose=loose, effort=effort)
-        if again is not None:
-            return replace(
-                state, evaluation=self._started(again, effort.history), pace=_Pace(self.method.forcing)
-            )
-        return replace(state, evaluation=damped.point, before=evaluation.residuals)
+        loose, again = whole and self._forces_known(evaluation), state.instead
+        how = "contact solved as a whole" if whole else f"forcing {pace.forcing:.1e}"
+        line = self._line(state, damped, taken, [how, *held])
+        if (damped.fraction == 1.0 and line.residuals.worst < evaluation.residuals.worst) or again is None:
+            state = state.after(line, taken, loose)
+            return replace(state, evaluation=damped.point, before=evaluation.residuals)
+        state = state.after(replace(line, note=f"{line.note}, begun again"), taken, loose)
+        evaluation = self._started(again, state.history)
+        return replace(state, evaluation=evaluation, pace=_Pace(self.method.forcing))
 
     def _started(self, at: Configuration, history: tuple[SolverStep, ...] = ()) -> ResidualState:
         """Return the equations where Newton's method starts. Collective."""
@@ -371,14 +373,13 @@ class _Run:
         comm = evaluation.torn.numbering.comm
         return global_sum(comm, np.count_nonzero(evaluation.at.multiplier))[0] > 0.0
 
-    def _solved(self, state: _State) -> tuple[TangentStep, Linearisation, bool]:
+    def _solved(self, state: _State, near: Linearisation) -> tuple[TangentStep, Linearisation, bool]:
         """Solve the face at the present point, or contact as a whole. Collective.
 
         At the start of a history nothing is known of the active set. Returns the step, the linearisation that
         it solves, and whether it is that of contact as a whole.
         """
-        evaluation, method, near = state.evaluation, self.method, state.near
-        assert near is not None
+        evaluation, method = state.evaluation, self.method
         step = np.concatenate([evaluation.at.natural_step(state.pace.caution), np.zeros(near.further.count)])
         if state.history or evaluation.torn.points.count == 0 or self._forces_known(evaluation):
             floor = method.fine * method.tolerance * evaluation.residuals.gluing_scale
@@ -410,7 +411,7 @@ class _Run:
         """
         solver = self._whole(evaluation, near)
         if evaluation.load.is_sprung:
-            given_way = evaluation.linearised(self.timer, None, springs=False)
+            given_way = evaluation.linearised_without_springs(self.timer)
             own = step[: len(evaluation.at.multiplier)]
             own = np.concatenate([own, np.zeros(given_way.further.count)])
             try:
@@ -470,16 +471,14 @@ class _Run:
         )
 
     def _line(
-        self, state: _State, damped: Damped[ResidualState], taken: TangentStep, whole: bool
+        self, state: _State, damped: Damped[ResidualState], taken: TangentStep, remarks: list[str]
     ) -> SolverStep:
         """Return the line of history of a step. Collective."""
-        assert state.near is not None
         closed, stick, slip = taken.face.counts(state.evaluation.torn.numbering.comm)
-        softened = state.near.system.softened
-        notes = ["contact solved as a whole"] if whole else [f"forcing {state.pace.forcing:.1e}"]
+        notes = remarks[:1]
         notes += [f"cut to {damped.fraction:g} of the step"] if damped.fraction < 1.0 else []
         notes += [taken.stop.value] if taken.stop is not Stop.CONVERGED else []
-        notes += [f"{softened} soft motions held"] if softened else []
+        notes += remarks[1:]
         number, residuals = len(state.history), damped.point.residuals
         return SolverStep("Newton", number, taken.products, residuals, closed, stick, slip, ", ".join(notes))
 

@@ -79,19 +79,30 @@ class TurnedSurface:
             found.append(cls(support, support.prescribed, support.load, springs, nodes, points, far, whole))
         return tuple(found)
 
-    def between(self, first: TurnedSurface | None, part: float) -> TurnedSurface:
-        """Return it at a part of the way from another motion and load, by default from rest."""
+    @property
+    def at_rest(self) -> TurnedSurface:
+        """The surface without motion and load."""
+        return replace(self, motion=np.zeros_like(self.motion), load=np.zeros_like(self.load))
+
+    def mixed(self, first: TurnedSurface, part: float) -> TurnedSurface:
+        """Return it at a part of the way from another motion and load, with its own springs."""
 
         def mixed(name: str) -> np.ndarray:
-            start = np.zeros_like(self.load) if first is None else getattr(first, name)
-            return np.asarray((1.0 - part) * start + part * getattr(self, name))
+            return np.asarray((1.0 - part) * getattr(first, name) + part * getattr(self, name))
 
-        springs = self.springs if first is None else mixed("springs")
-        return replace(self, motion=mixed("motion"), load=mixed("load"), springs=springs)
+        return replace(self, motion=mixed("motion"), load=mixed("load"))
 
-    def turn_from(self, first: TurnedSurface | None) -> np.ndarray:
-        """Return the rotation that is given on the way from another motion, from rest, (1,) or (3,)."""
-        start = np.zeros_like(self.motion) if first is None else first.motion
+    def between(self, before: Mapping[tuple[str, str], TurnedSurface], part: float) -> TurnedSurface:
+        """Return it at a part of the way from where it was before, from rest if it was not there."""
+        if self.place not in before:
+            return self.mixed(self.at_rest, part)
+        first = before[self.place]
+        springs = np.asarray((1.0 - part) * first.springs + part * self.springs)
+        return replace(self.mixed(first, part), springs=springs)
+
+    def turn_from(self, before: Mapping[tuple[str, str], TurnedSurface]) -> np.ndarray:
+        """Return the rotation that is given on the way from where it was before, or rest, (1,) or (3,)."""
+        start = before.get(self.place, self.at_rest).motion
         return np.where(self.free, 0.0, self.motion - start)[self.surface.dim :]
 
     def at(self, motions: Motions) -> TurnedSurface:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -127,6 +128,10 @@ def mostly_positive(matrix: sp.csr_matrix, unused: RefillableFactor | None) -> R
 StressStiffness = Callable[[], sp.csr_matrix]
 
 
+#: Factors that may be refilled: of the held tangent, and of its inner dofs.
+Released: TypeAlias = "tuple[RefillableFactor | None, RefillableFactor | None]"
+
+
 class TangentOperator(FactoredOperator):
     """K_ρ⁻¹ with K_ρ = K + C Cᵀ, and a Schur complement on the interface, for a symmetric tangent K.
 
@@ -143,7 +148,6 @@ class TangentOperator(FactoredOperator):
     _fixing: np.ndarray
     _searched: np.ndarray
     _softest: float
-    _released: tuple[RefillableFactor | None, RefillableFactor | None] = (None, None)
     #: Motions softer than this fraction of the softest one without stress are held by columns of their own,
     soft = 0.5
     #: by this multiple of their negative stiffness,
@@ -152,23 +156,21 @@ class TangentOperator(FactoredOperator):
     least_grip = 0.1
     #: New vectors in the search for soft motions,
     probes = 4
-    #: iterations of the first search,
-    first_sweeps = 6
-    #: and of later ones, which start from what was found before.
+    #: and iterations of later searches, which start from what was found before.
     later_sweeps = 2
 
     def __init__(
         self,
         subdomain: Subdomain,
         interface: np.ndarray,
-        earlier: TangentOperator | None,
+        earlier: TangentOperator | NoTangent,
         by_stress: StressStiffness | None = None,
     ) -> None:
         """Factor a subdomain; ``by_stress`` assembles the part of its tangent that is due to stress."""
         K, size = subdomain.stiffness, subdomain.mesh.size
         typical = float(np.abs(K.diagonal()).max())
-        self._fixing = _well_spread(subdomain.points) if earlier is None else earlier._fixing
-        unused, inner = (None, None) if earlier is None else earlier._released
+        self._fixing = earlier.fixing_dofs(subdomain.points)
+        unused, inner = earlier.released
         dofs, basis = self._fixing, motions_at(self._fixing, subdomain.kernel)
         held = held_by(K, dofs, basis, typical)
         factor = with_inertia(held, unused)
@@ -188,30 +190,35 @@ class TangentOperator(FactoredOperator):
         inner = mostly_positive(K[rest][:, rest].tocsr(), inner) if len(rest) else None
         inside = NoFactor() if inner is None else _Updated(inner, self._at_rest, self._relief)
         self._factors = factor, inner
+        self.released: Released = (None, None)
         super().__init__(K, interface, whole, inside)
 
     def release_factors(self) -> None:
         """Hand the factorisation to the operator of the next shape; do not use this one afterwards."""
-        self._released = self._factors
+        self.released = self._factors
+
+    def fixing_dofs(self, points: np.ndarray) -> np.ndarray:
+        """Return the dofs by which a subdomain is held."""
+        return self._fixing
+
+    def softest(
+        self, held: sp.csr_matrix, factor: IndefiniteFactor, probes: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return eigenvalues next to zero and their vectors, and the softest one without stress."""
+        probes = np.hstack([self._searched, probes])
+        return *_softest(held, factor, probes, self.later_sweeps), self._softest
 
     def _soft_motions(
         self,
         held: sp.csr_matrix,
         factor: IndefiniteFactor,
-        earlier: TangentOperator | None,
+        earlier: TangentOperator | NoTangent,
         typical: float,
         by_stress: StressStiffness | None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return motions that need columns of their own, shape (n, k), and the stiffness of each."""
         probes = np.random.default_rng(0).standard_normal((factor.size, self.probes))
-        sweeps = self.later_sweeps
-        if earlier is not None:
-            probes, self._softest = np.hstack([earlier._searched, probes]), earlier._softest
-        else:
-            sweeps = self.first_sweeps
-        values, vectors = _softest(held, factor, probes, sweeps)
-        if earlier is None:
-            self._softest = float(np.abs(values).min())
+        values, vectors, self._softest = earlier.softest(held, factor, probes)
         soft = values < self.soft * self._softest
         if by_stress is not None and soft.any():
             # What materials themselves resist less, as beyond yield, stress has not softened.
@@ -228,6 +235,25 @@ class TangentOperator(FactoredOperator):
     def _forces_from_inside(self, displacement: np.ndarray) -> np.ndarray:
         moved = self._relief @ (self._at_rest.T @ displacement)
         return super()._forces_from_inside(displacement) + self._at_interface @ moved
+
+
+class NoTangent:
+    """What is known of a subdomain before its first tangent."""
+
+    released: Released = (None, None)
+    #: Iterations of the first search for soft motions.
+    sweeps = 6
+
+    def fixing_dofs(self, points: np.ndarray) -> np.ndarray:
+        """Return the dofs by which a subdomain is held."""
+        return _well_spread(points)
+
+    def softest(
+        self, held: sp.csr_matrix, factor: IndefiniteFactor, probes: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return eigenvalues next to zero and their vectors, and the softest one without stress."""
+        values, vectors = _softest(held, factor, probes, self.sweeps)
+        return values, vectors, float(np.abs(values).min())
 
 
 def _well_spread(points: np.ndarray, spread: float = 4.0) -> np.ndarray:
@@ -332,7 +358,9 @@ class TangentInverse(TornInverse):
         self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations
     ) -> LocalOperator:
         number = subdomain.mesh.number
-        return TangentOperator(subdomain, interface, self._earlier.get(number), self._by_stress.get(number))
+        return TangentOperator(
+            subdomain, interface, self._earlier.get(number, NoTangent()), self._by_stress.get(number)
+        )
 
     @property
     def tangents(self) -> Sequence[TangentOperator]:
