@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 import matplotlib as mpl
 import numpy as np
@@ -106,16 +106,19 @@ class Picture:
 
     def _repr_mimebundle_(self, **_: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         """Show many pixels on a limited width: sharp on fine screens, and no wider than a notebook."""
-        if self.png is None or self.size is None:
+        size = self.size
+        if size is None:
             return {"text/plain": ""}, {}
-        width = min(self.size[0], SHOWN_WIDTH)
+        width = min(size[0], SHOWN_WIDTH)
         return {"image/png": self.png, "text/plain": str(self)}, {"image/png": {"width": width}}
 
 
 def png_path(path: str | Path | None) -> Path | None:
     """Return the path if it names a PNG file, else raise."""
-    target = None if path is None else Path(path)
-    if target is not None and target.suffix != ".png":
+    if path is None:
+        return None
+    target = Path(path)
+    if target.suffix != ".png":
         raise InvalidInputError(f"pictures are PNG files, got the name {target.name!r}: let it end in '.png'")
     return target
 
@@ -348,14 +351,16 @@ def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Figure
         figure.savefig(paper, dpi=dpi, format="png")
 
 
-def show_image(
-    axes: Axes, image: np.ndarray, frame: Frame, title: str = "", *, coordinates: bool = False
-) -> None:
-    """Show an image of a frame's content, in the frame's coordinates, with or without these at the axes."""
+def show_image(axes: Axes, image: np.ndarray, frame: Frame, title: str = "") -> None:
+    """Show an image of a frame's content, in the frame's coordinates."""
     axes.imshow(image, extent=(frame.low[0], frame.high[0], frame.low[1], frame.high[1]))
-    if not coordinates:
-        axes.set_axis_off()
     axes.set_title(title)
+
+
+def show_view(axes: Axes, image: np.ndarray, frame: Frame, title: str = "") -> None:
+    """Show an image without coordinates."""
+    show_image(axes, image, frame, title)
+    axes.set_axis_off()
 
 
 def add_colour_bar(
@@ -473,8 +478,14 @@ class Units:
     stress: str = "MPa"
 
 
-def checked_range(clim: tuple[float, float]) -> tuple[float, float]:
-    """Return a colour range if it is finite and not empty, else raise."""
+#: Of colours; () for one to be chosen.
+Range: TypeAlias = tuple[float, float] | tuple[()]
+
+
+def checked_range(clim: tuple[float, float] | None) -> Range:
+    """Return a colour range if it is finite and not empty, () if it is to be chosen, else raise."""
+    if clim is None:
+        return ()
     low, high = (float(value) for value in clim)
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InvalidInputError(f"clim must be finite (low, high) with low < high, got {clim}: widen it")
@@ -501,10 +512,13 @@ def written(value: float, digits: int = 4) -> str:
     return text.replace(",", "\u202f").replace("-", "\u2212")
 
 
-def checked_reach(reach: float | None) -> None:
-    """Reject an extent of a picture that is not positive."""
-    if reach is not None and not 0 < reach < np.inf:
+def checked_reach(reach: float | None) -> float:
+    """Return the extent of a picture if it is positive, 0 if it is to be chosen, else raise."""
+    if reach is None:
+        return 0.0
+    if not 0 < reach < np.inf:
         raise InvalidInputError(f"reach must be positive, got {reach}: leave it out to have it chosen")
+    return reach
 
 
 def nice_number(value: float) -> float:

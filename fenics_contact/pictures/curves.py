@@ -157,7 +157,7 @@ class ContactTrace:
         """Insert a gap into nodal values where the surface is interrupted."""
         return np.insert(values, self.breaks + 1, np.nan)
 
-    def window(self, reach: float | None) -> tuple[float, float]:
+    def window(self, reach: float = 0.0) -> tuple[float, float]:
         """Return the visible range of positions, or the given extent around the middle of the closed part.
 
         It is the closed part with a margin and the open nodes beside it, where the pressure has come to zero.
@@ -165,7 +165,7 @@ class ContactTrace:
         closed = np.flatnonzero(self.pressure > 0)
         closed = closed if len(closed) else np.arange(len(self.places))
         low, high = float(self.places[closed].min()), float(self.places[closed].max())
-        if reach is not None:
+        if reach:
             return (low + high) / 2 - reach, (low + high) / 2 + reach
         room = 0.12 * max(high - low, float(np.ptp(self.places)) / 20)
         before, after = max(closed[0] - 1, 0), min(closed[-1] + 1, len(self.places) - 1)

@@ -48,7 +48,7 @@ from fenics_contact.pictures.canvas import (
     png_path,
     render,
     sheet,
-    show_image,
+    show_view,
     written,
 )
 from fenics_contact.pictures.curves import contact_trace
@@ -116,8 +116,7 @@ def plot_before_after(
     states = [point.state if isinstance(point, DesignPoint) else point for point in (first, best)]
     before, after = states
     _check(before, after, pair)
-    checked_reach(reach)
-    given = None if clim is None else checked_range(clim)
+    around, given = checked_reach(reach), checked_range(clim)
     named, plane = units or Units(), before.scene.dim == 2
     peaks = [float(state.contact.pressure[state.contact.on_pair(pair)].max(initial=0.0)) for state in states]
     values = [each.value for each in (first, best) if isinstance(each, DesignPoint)]
@@ -128,14 +127,14 @@ def plot_before_after(
     shown, words = given or (0.0, max(peaks) or 1.0), headline(title, "; ".join(facts))
 
     def draw(paper: BinaryIO) -> None:
-        outlines = _outlines(before, after, reach, named.length)
+        outlines = _outlines(before, after, around, named.length)
         with sheet(paper, (width, round((0.5 if plane else 0.95) * width)), words) as figure:
             if plane:
                 left, *panels = figure.subplots(1, 2)
-                _draw_traces(left, states, pair, shown, reach, named)
+                _draw_traces(left, states, pair, shown, around, named)
             else:
                 upper, lower = figure.subfigures(2, 1, height_ratios=[0.48, 0.47])
-                _draw_patches(upper, states, pair, shown, reach, named)
+                _draw_patches(upper, states, pair, shown, around, named)
                 panels = list(lower.subplots(1, 2, width_ratios=[each.frame.proportion for each in outlines]))
             for axes, outline in zip(panels, outlines, strict=True):
                 outline.draw(axes, min(each.factor for each in outlines), named)
@@ -172,7 +171,7 @@ def _draw_patches(
     states: list[State],
     pair: int,
     clim: tuple[float, float],
-    reach: float | None,
+    reach: float,
     units: Units,
 ) -> None:
     """Draw the pressure before and after side by side in one frame."""
@@ -193,7 +192,7 @@ def _draw_traces(
     states: list[State],
     pair: int,
     clim: tuple[float, float],
-    reach: float | None,
+    reach: float,
     units: Units,
 ) -> None:
     """Draw the pressure along a plane surface before and after."""
@@ -252,7 +251,7 @@ class _Outlines:
         axes.set_title(f"{self.title}\nmoved by up to {written(self.largest, 2)} {units.length}")
 
 
-def _outlines(first: State, best: State, reach: float | None, unit: str) -> list[_Outlines]:
+def _outlines(first: State, best: State, reach: float, unit: str) -> list[_Outlines]:
     """Return the outlines around the strongest contact before: in the plane one, in space two sections."""
     bodies: dict[str, pv.DataSet] = {}
     for name, body in first.scene.deforming.items():
@@ -260,7 +259,7 @@ def _outlines(first: State, best: State, reach: float | None, unit: str) -> list
         bodies[name].point_data["moves"] = in_space(best.scene.bodies[name].mesh.points - body.mesh.points)
     spot, points = strongest_contact(first.contact, first.contact_places), points_of(bodies)
     if first.scene.dim == 2:
-        half, whole = REACH * spot.radius if reach is None else reach, frame_around(IN_PLANE, points, BORDER)
+        half, whole = reach or REACH * spot.radius, frame_around(IN_PLANE, points, BORDER)
         frame = Frame(np.maximum(spot.centre - half, whole.low), np.minimum(spot.centre + half, whole.high))
         return [_outlined("outlines", bodies, IN_PLANE, frame)]
     outlines = []
@@ -330,7 +329,7 @@ def plot_control_net(
     start, movement = reference[surface.nodes], (moved - reference)[surface.nodes]
     outward = np.einsum("nd,nd->n", movement, surface.directions)
     largest = float(np.abs(outward).max()) or 1.0
-    shown, named = (-largest, largest) if clim is None else checked_range(clim), units or Units()
+    shown, named = checked_range(clim) or (-largest, largest), units or Units()
     factor = _chosen_factor(start, movement) if magnify is None else checked_factor("magnify", magnify)
     shape = (*surface.counts, dim)
     surfaces = start.reshape(shape), (start + factor * movement).reshape(shape)
@@ -344,7 +343,7 @@ def plot_control_net(
         with sheet(paper, (width, round(height * width)), words) as figure:
             panels = figure.subplots(1, 2 if dim == 3 else 1, squeeze=False)[0]
             for axes, (image, frame), name in zip(panels, parts, ("before", after), strict=False):
-                show_image(axes, image, frame, name)
+                show_view(axes, image, frame, name)
             if dim == 2:
                 _draw_curve(panels[0], surfaces, nets, outward, shown)
                 panels[0].set(title=f"before in grey, {after}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
@@ -39,6 +40,7 @@ from fenics_contact.pictures.canvas import (
     render,
     sheet,
     show_image,
+    show_view,
 )
 from fenics_contact.pictures.section import (
     Bodies,
@@ -254,8 +256,8 @@ def _circle(centre: np.ndarray, axes: tuple[np.ndarray, np.ndarray], radius: flo
 class ColouredField:
     """The content of a picture of a field, apart from the bodies.
 
-    `reach`: extent of details to each side of the contact's centre, or None; `axes`: names of the coordinates
-    of plane bodies, of bodies of revolution r and z.
+    `reach`: extent of details to each side of the contact's centre, 0 if chosen; `axes`: names of the
+    coordinates of plane bodies, of bodies of revolution r and z.
     """
 
     values: Mapping[str, np.ndarray]
@@ -264,7 +266,7 @@ class ColouredField:
     label: str
     headline: str
     scale: float
-    reach: float | None
+    reach: float
     units: Units
     width: int
     axes: tuple[str, str] = ("x", "y")
@@ -320,28 +322,28 @@ def draw_field_on_bodies(
     path: Path | None,
     *,
     obstacles: list[SurfaceShape],
-    spot: Spot | None = None,
+    spots: Sequence[Spot] = (),
     clip: Clip | None = None,
     comm: MPI.Comm | None = None,
 ) -> Picture:
     """Draw a field on all bodies, with details of a contact in true deformation. Collective on ``comm``.
 
-    `spot`: the contact of which a detail is drawn, in space two sections; None for no detail.
+    `spots`: contacts of which a detail is drawn, in space two sections.
     """
     coloured = field.on(bodies)
     plane = all(map(is_plane, bodies.values()))
     if clip is not None:
-        coloured = _clipped(coloured, clip, plane=plane)
+        if plane:
+            raise InvalidInputError("clip is for bodies in space, these are plane: leave it out")
+        coloured = _clipped(coloured, clip)
     parts_of = _in_plane if plane else _in_space
     return draw_picture(
-        comm, path, lambda paper: _draw(parts_of(coloured, obstacles, spot, field), paper, field)
+        comm, path, lambda paper: _draw(parts_of(coloured, obstacles, spots, field), paper, field)
     )
 
 
-def _clipped(bodies: Bodies, clip: Clip, *, plane: bool) -> dict[str, pv.UnstructuredGrid]:
+def _clipped(bodies: Bodies, clip: Clip) -> dict[str, pv.UnstructuredGrid]:
     """Return what a plane leaves of bodies, its normal pointing to what is cut away."""
-    if plane:
-        raise InvalidInputError("clip is for bodies in space, these are plane: leave it out")
     if len(clip) != 2 or np.ndim(clip[0]) != 1:
         raise InvalidInputError(
             f"clip must be (point, normal), got {clip!r}: at y = 2 ((0, 2, 0), (0, -1, 0))"
@@ -378,14 +380,14 @@ def _draw(parts: Sequence[_Part], paper: BinaryIO, field: ColouredField) -> None
 
 
 def _in_plane(
-    bodies: Bodies, obstacles: list[SurfaceShape], spot: Spot | None, field: ColouredField
+    bodies: Bodies, obstacles: list[SurfaceShape], spots: Sequence[Spot], field: ColouredField
 ) -> list[_Part]:
     """All bodies, and the contact if it is small."""
     everything = moved(bodies, field.scale)
     frame = frame_around(IN_PLANE, points_of(everything), 0.04)
     parts = [_Part(frame, partial(_draw_plane, everything, obstacles, frame, field, ""))]
-    if spot is not None:
-        half = REACH * spot.radius if field.reach is None else field.reach
+    for spot in spots:
+        half = field.reach or REACH * spot.radius
         detail = Frame(spot.centre - half, spot.centre + half)
         if 2 * half < LARGEST_DETAIL * float(np.max(frame.size)) / 1.08:
             words, true = "where they touch; displacement × 1", moved(bodies, 1.0)
@@ -410,7 +412,7 @@ def _draw_plane(
 
 
 def _in_space(
-    bodies: Bodies, obstacles: list[SurfaceShape], spot: Spot | None, field: ColouredField
+    bodies: Bodies, obstacles: list[SurfaceShape], spots: Sequence[Spot], field: ColouredField
 ) -> list[_Part]:
     """All bodies, and two sections through the contact on axes of their own."""
     everything = moved(bodies, field.scale)
@@ -423,8 +425,8 @@ def _in_space(
     # room for the directions of the axes
     frame = Frame(frame.low - [AXES / 2 * float(np.sqrt(np.prod(frame.size))), 0.0], frame.high)
     image = render(layers, view, frame, round(field.width * WIDE), axes=True)
-    parts = [_Part(frame, partial(show_image, image=image, frame=frame))]
-    return parts if spot is None else [*parts, *_sections(moved(bodies, 1.0), spot, view, field)]
+    details = (_sections(moved(bodies, 1.0), spot, view, field) for spot in spots)
+    return [_Part(frame, partial(show_view, image=image, frame=frame)), *chain.from_iterable(details)]
 
 
 def _sections(bodies: Bodies, spot: Spot, main: View, field: ColouredField) -> Iterator[_Part]:
@@ -438,5 +440,5 @@ def _sections(bodies: Bodies, spot: Spot, main: View, field: ColouredField) -> I
 
 
 def _draw_section(image: np.ndarray, frame: Frame, title: str, view: View, units: Units, axes: Axes) -> None:
-    show_image(axes, image, frame, title, coordinates=True)
+    show_image(axes, image, frame, title)
     label_axes(axes, view, units)

@@ -29,7 +29,7 @@ from fenics_contact.pictures.canvas import (
     png_path,
     render,
     sheet,
-    show_image,
+    show_view,
     written,
 )
 from fenics_contact.pictures.curves import LOOKS
@@ -79,12 +79,12 @@ def plot_levels(
         with sheet(paper, (width, round(0.5 * width)), title) as figure:
             panels = figure.subplots(1, 2, sharey=True)
             for (name, levels), (colour, symbol) in zip(series.items(), cycle(LOOKS)):
-                estimated, true = _errors(levels, exact)
+                best, *others = _errors(levels, exact)
                 look = {"color": colour, "lw": 2.0}
                 marked = {**look, "marker": symbol, "ms": 7, "markeredgecolor": "white", "label": name}
                 for axes, x in zip(panels, _costs(levels), strict=True):
-                    axes.plot(x, estimated if true is None else true, **marked)
-                    if true is not None:
+                    axes.plot(x, best, **marked)
+                    for estimated in others:
                         axes.plot(x, estimated, "--", **{**look, "lw": 1.2})
             for axes, words in zip(panels, ("unknowns", "seconds of all meshes so far"), strict=True):
                 axes.set(xscale="log", yscale="log", xlabel=words)
@@ -101,12 +101,12 @@ def _costs(levels: Sequence[Level]) -> tuple[list[int], np.ndarray]:
     return [level.unknowns for level in levels], np.cumsum([level.seconds for level in levels])
 
 
-def _errors(levels: Sequence[Level], exact: float | None) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return estimated and true relative errors; NaN where they are unknown or zero."""
+def _errors(levels: Sequence[Level], exact: float | None) -> list[np.ndarray]:
+    """Return true relative errors, where they are known, and estimated ones; NaN where unknown or zero."""
     value, error = (np.array([getattr(level, name) for level in levels]) for name in ("value", "error"))
-    size = np.abs(value) if exact is None else abs(exact)
-    true = None if exact is None else _positive(np.abs(value - exact) / size)
-    return _positive(error / size), true
+    if exact is None:
+        return [_positive(error / np.abs(value))]
+    return [_positive(np.abs(value - exact) / abs(exact)), _positive(error / abs(exact))]
 
 
 def _positive(errors: np.ndarray) -> np.ndarray:
@@ -164,7 +164,7 @@ def plot_meshes(
                     _draw_plane(axes, grids)
                 else:
                     layers = [Layer(grid.extract_surface(algorithm=None), _LOOK) for grid in grids.values()]
-                    show_image(axes, render(layers, view, frame, round(wide)), frame)
+                    show_view(axes, render(layers, view, frame, round(wide)), frame)
                 frame.fit(axes)
                 axes.set_axis_off()
                 count = sum(scenes[words].bodies[name].mesh.n_cells for name in grids)

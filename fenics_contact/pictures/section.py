@@ -464,14 +464,14 @@ def sections_of(spot: Spot, main: View) -> list[Section]:
     ]
 
 
-def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | None = None) -> Frame:
+def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float = 0.0) -> Frame:
     """Return the frame around a contact, limited to the visible bodies.
 
     `reach`: extent up and down; by default five times the radius of the contact.
     """
     bodies = frame_around(view, points, 0.0)
     middle = view.project(spot.centre[None])[0]
-    half = (SECTION_REACH * spot.radius if reach is None else reach) * np.array([PROPORTION, 1.0])
+    half = (reach or SECTION_REACH * spot.radius) * np.array([PROPORTION, 1.0])
     border = SECTION_BORDER * min(float(half[1]), float(np.max(bodies.size)) / 2)
     return Frame(
         np.maximum(middle - half, bodies.low - border), np.minimum(middle + half, bodies.high + border)

@@ -27,6 +27,7 @@ from fenics_contact.pictures.canvas import (
     SIGNED_MAP,
     STRESS_MAP,
     Picture,
+    Range,
     Units,
     checked_factor,
     checked_range,
@@ -139,7 +140,7 @@ def plot_decomposition(
     norm = Normalize(-0.5, colours.N - 0.5)
     words, named = headline(title, facts), units or Units()
     axes = axes_of(scene)
-    field = ColouredField(values, colours, norm, "", words, 1.0, None, named, width, axes)
+    field = ColouredField(values, colours, norm, "", words, 1.0, 0.0, named, width, axes)
     return draw_field_on_bodies(bodies, field, target, obstacles=[], comm=comm)
 
 
@@ -201,16 +202,14 @@ def plot_stress(
         >>> plot_stress(state, "output/stress.png", clim=(0, 400), scale=50)  # doctest: +SKIP
         >>> plot_stress(state)  # in a notebook  # doctest: +SKIP
     """
-    target = png_path(path)
-    if scale is not None:
-        checked_factor("scale", scale)
-    checked_reach(reach)
-    given = None if clim is None else checked_range(clim)
+    target, around = png_path(path), checked_reach(reach)
+    given = checked_range(clim)
     if revolved:
         check_turned(revolved, state.scene.axisymmetric)
     bodies, obstacles = drawn_bodies(state), obstacles_of(state)
     # With magnified displacement bodies would penetrate rigid obstacles.
-    factor = float(scale) if scale is not None else 1.0 if obstacles else chosen_scale(bodies)
+    chosen = 1.0 if obstacles else chosen_scale(bodies)
+    factor = chosen if scale is None else checked_factor("scale", scale)
     by_cell, named = np.concatenate([body["von_mises"] for body in bodies.values()]), units or Units()
     facts = f"von Mises stress, largest mean over a cell {written(float(by_cell.max()))} {named.stress}"
     values = {
@@ -220,12 +219,12 @@ def plot_stress(
     words = headline(title, f"{facts}; displacement × {factor:g}")
     label = f"von Mises stress ({named.stress})"
     axes = axes_of(state.scene)
-    coloured = ColouredField(values, STRESS_MAP, norm, label, words, factor, reach, named, width, axes)
-    spot = contact_spot(state, bodies) if sections and not revolved else None
+    coloured = ColouredField(values, STRESS_MAP, norm, label, words, factor, around, named, width, axes)
+    spots = contact_spots(state, bodies) if sections and not revolved else []
     if revolved:
         bodies, coloured, obstacles = _turned(bodies, coloured, obstacles, revolved)
     return draw_field_on_bodies(
-        bodies, coloured, target, obstacles=obstacles, spot=spot, comm=state.torn.decomposition.comm
+        bodies, coloured, target, obstacles=obstacles, spots=spots, comm=state.torn.decomposition.comm
     )
 
 
@@ -275,7 +274,7 @@ def plot_field(
     """
     target, named = png_path(path), units or Units()
     checked_factor("scale", scale)
-    given = None if clim is None else checked_range(clim)
+    given = checked_range(clim)
     state = result if isinstance(result, State) else None
     if revolved:
         check_turned(revolved, state is not None and state.scene.axisymmetric)
@@ -299,7 +298,7 @@ def plot_field(
     norm = Normalize(*(given or (ends if is_status else entry["range"])))
     head = headline(title, f"{facts}; displacement × {scale:g}")
     axes = axes_of(state.scene) if state else ("x", "y")
-    coloured = ColouredField(values, colours, norm, words, head, float(scale), None, named, width, axes)
+    coloured = ColouredField(values, colours, norm, words, head, float(scale), 0.0, named, width, axes)
     obstacles = obstacles_of(state) if state else []
     if revolved:
         drawn, coloured, obstacles = _turned(drawn, coloured, obstacles, revolved)
@@ -354,11 +353,11 @@ def _own_field(
     return values, {"label": label or "given values", "unit": "", **range_of([drawn], [extremes])}
 
 
-def contact_spot(state: State, bodies: Bodies) -> Spot | None:
-    """Return the strongest contact of a state, None if no contact carries force."""
+def contact_spots(state: State, bodies: Bodies) -> list[Spot]:
+    """Return the strongest contact of a state, none if no contact carries force."""
     if not np.any(state.contact.normal_force > 0):
-        return None
-    return strongest_contact(state.contact, contact_places(state, moved(bodies, 1.0)))
+        return []
+    return [strongest_contact(state.contact, contact_places(state, moved(bodies, 1.0)))]
 
 
 def chosen_scale(bodies: Bodies) -> float:
@@ -405,10 +404,9 @@ def plot_error(
         InvalidInputError: If the number of parts is not that of the cells, materials are nonlinear and none
             are given, or an option or the name of the file cannot be used.
     """
-    target = png_path(path)
-    checked_reach(reach)
-    given = None if clim is None else checked_range(clim)
-    if given is not None and given[0] <= 0:
+    target, around = png_path(path), checked_reach(reach)
+    given = checked_range(clim)
+    if given and given[0] <= 0:
         raise InvalidInputError(f"clim of a logarithmic scale must be positive, got {clim}: try (1e-5, 1e-2)")
     if by_cell is None:
         errors = as_linear(state, "errors").estimate_errors(geometry=False)
@@ -422,10 +420,12 @@ def plot_error(
     shown = {name: part[state.scene.bodies[name].mesh.cells_cut] for name, part in parts.items()}
     words, label = headline(title, facts), "part of a cell, relative"
     colours, axes = (ERROR_MAP, LogNorm(*ends)), axes_of(state.scene)
-    coloured = ColouredField(shown, *colours, label, words, 1.0, reach, named, width, axes)
-    spot = contact_spot(state, bodies) if sections else None
+    coloured = ColouredField(shown, *colours, label, words, 1.0, around, named, width, axes)
+    spots = contact_spots(state, bodies) if sections else []
     comm = state.torn.decomposition.comm
-    return draw_field_on_bodies(bodies, coloured, target, obstacles=obstacles_of(state), spot=spot, comm=comm)
+    return draw_field_on_bodies(
+        bodies, coloured, target, obstacles=obstacles_of(state), spots=spots, comm=comm
+    )
 
 
 def _checked(name: str, cells: int, by_cell: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -469,7 +469,7 @@ def plot_contact_status(
     Raises:
         InvalidInputError: If there is no state, one has no such pair, or one is plane.
     """
-    target = png_path(path)
+    target, around = png_path(path), checked_reach(reach)
     if not isinstance(states, Mapping):
         states = {"": states}
     if not states:
@@ -485,7 +485,7 @@ def plot_contact_status(
     comm = next(iter(states.values())).torn.decomposition.comm
 
     def draw(paper: BinaryIO) -> None:
-        patches = dict(zip(states, contact_patches(list(states.values()), pair, reach), strict=True))
+        patches = dict(zip(states, contact_patches(list(states.values()), pair, around), strict=True))
         _draw_status(patches, paper, title or next(iter(patches.values())).name, units or Units(), width)
 
     return draw_picture(comm, target, draw)
@@ -578,15 +578,15 @@ def plot_contact_pressure(
         InvalidInputError: If the scene has no such pair, or a range or the name of the file cannot be used.
     """
     target, number = png_path(path), checked_pair(state, pair)
-    checked_reach(reach)
-    given = None if clim is None else checked_range(clim)
+    around = checked_reach(reach)
+    given = checked_range(clim)
     named = units or Units()
 
     def draw(paper: BinaryIO) -> None:
         if state.scene.dim == 2:
-            draw_traction(contact_trace(state, number), paper, (given, reach), title, named, width)
+            draw_traction(contact_trace(state, number), paper, (given, around), title, named, width)
         else:
-            _draw_pressure(contact_patches([state], number, reach)[0], paper, given, title, named, width)
+            _draw_pressure(contact_patches([state], number, around)[0], paper, given, title, named, width)
 
     return draw_picture(state.torn.decomposition.comm, target, draw)
 
@@ -594,7 +594,7 @@ def plot_contact_pressure(
 def _draw_pressure(
     patch: ContactPatch,
     paper: BinaryIO,
-    clim: tuple[float, float] | None,
+    clim: Range,
     title: str,
     units: Units,
     width: int,

@@ -25,6 +25,7 @@ from fenics_contact.pictures.canvas import (
     PALE,
     PRESSURE_MAP,
     Frame,
+    Range,
     Units,
     View,
     axis_label,
@@ -91,6 +92,32 @@ class Unrolling:
             return f"around the axis ({units.length})", f"along the axis ({units.length})"
         return f"around {axis} ({units.length}), 0 towards {zero}", f"{axis} ({units.length})"
 
+    def label(self, axes: Axes, units: Units, *, mirror: bool) -> None:
+        """Name the axes, which no side reverses."""
+        across, along = self.labels(units)
+        axes.set(xlabel=across, ylabel=along)
+
+
+@dataclass(frozen=True)
+class Projection:
+    """A surface seen in a direction, with the members of an `Unrolling`."""
+
+    view: View
+
+    def unroll(self, points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Project a surface without the facets that face away."""
+        facing = facets[vector_areas(points, facets) @ self.view.towards > 0]
+        node, rows = np.unique(facing, return_inverse=True)
+        return node, self.view.project(points[node]), rows.reshape(facing.shape)
+
+    def turn(self, vectors: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return vectors, (n, 3), as they are seen, (n, 2)."""
+        return self.view.project(vectors)
+
+    def label(self, axes: Axes, units: Units, *, mirror: bool) -> None:
+        """Name the axes, see `label_axes`."""
+        label_axes(axes, self.view, units, mirror=mirror)
+
 
 def unrolling_of(
     points: np.ndarray, facets: np.ndarray, places: np.ndarray, force: np.ndarray
@@ -142,12 +169,11 @@ def _half_turn(angles: np.ndarray) -> np.ndarray:
 class ContactPatch:
     """The slave surface projected to a plane or unrolled, and its contact points.
 
-    `unrolling`: how the surface is unrolled instead, or None; `places`: all nodes of the surface in the
+    `flat`: how the surface is made plane; `places`: all nodes of the surface in the
     picture; `pressure`: on all nodes of the surface, interpolated at the corners of quadratic triangles.
     """
 
-    view: View
-    unrolling: Unrolling | None
+    flat: Projection | Unrolling
     name: str
     places: np.ndarray
     facets: np.ndarray
@@ -188,16 +214,17 @@ def checked_pair(state: State, pair: int | str) -> int:
     return pair
 
 
-def contact_patches(states: Sequence[State], pair: int, reach: float | None) -> list[ContactPatch]:
+def contact_patches(states: Sequence[State], pair: int, reach: float = 0.0) -> list[ContactPatch]:
     """Show the slave surface of a pair in several states alike.
 
     It is projected to a plane. If facets that face away carry force it is unrolled, provided that it runs
     around an axis.
     """
-    patches = [_patch(state, pair, reach, None) for state in states]
-    behind = next((state for state, patch in zip(states, patches, strict=True) if patch.hidden), None)
-    if behind is None:
+    patches = [_patch(state, pair, reach, _projection(state, pair)) for state in states]
+    hiding = [state for state, patch in zip(states, patches, strict=True) if patch.hidden]
+    if not hiding:
         return patches
+    behind = hiding[0]
     contact, slave = behind.contact, behind.scene.contacts[pair].slave
     points, chosen = behind.scene.bodies[slave.body].mesh.points, behind.contact.on_pair(pair)
     places, force = behind.contact_places[chosen], contact.normal_force[chosen]
@@ -205,20 +232,20 @@ def contact_patches(states: Sequence[State], pair: int, reach: float | None) -> 
     return patches if unrolling is None else [_patch(state, pair, reach, unrolling) for state in states]
 
 
-def _patch(state: State, pair: int, reach: float | None, unrolling: Unrolling | None) -> ContactPatch:
-    """Unroll the slave surface, or project it to a plane without the facets that face away."""
+def _projection(state: State, pair: int) -> Projection:
+    """Return the projection along the mean normal of the contact, or of the surface without forces."""
+    chosen = state.contact.on_pair(pair)
+    force = state.contact.normal_force[chosen]
+    weight = force if float(force.sum()) > 0 else np.ones(len(chosen))
+    return Projection(face_on(-weight @ state.contact.points.normal[chosen]))
+
+
+def _patch(state: State, pair: int, reach: float, flat: Projection | Unrolling) -> ContactPatch:
+    """Make the slave surface plane, with its contact points."""
     contact, slave = state.contact, state.scene.contacts[pair].slave
     mesh, facets = state.scene.bodies[slave.body].mesh, state.scene.facets(slave)
     chosen = contact.on_pair(pair)
-    force = float(contact.normal_force[chosen].sum())
-    weight = contact.normal_force[chosen] if force > 0 else np.ones(len(chosen))
-    view = face_on(-weight @ contact.points.normal[chosen])
-    if unrolling is None:
-        facing = facets[vector_areas(mesh.points, facets) @ view.towards > 0]
-        node, rows = np.unique(facing, return_inverse=True)
-        places = view.project(mesh.points[node])
-    else:
-        node, places, rows = unrolling.unroll(mesh.points, facets)
+    node, places, rows = flat.unroll(mesh.points, facets)
     nodes, first = np.unique(node, return_index=True)
     numbers = state.torn.decomposition.tearing.global_nodes(slave.body, nodes)
     seen = np.isin(contact.points.slave[chosen], numbers)
@@ -237,15 +264,14 @@ def _patch(state: State, pair: int, reach: float | None, unrolling: Unrolling | 
     pressure = np.maximum(pressure[node], 0.0)
     slip = contact.slip_in_space[chosen]
     return ContactPatch(
-        view, unrolling, f"{slave.body}, {slave.name}", places, rows.reshape(-1, facets.shape[1]), pressure,
-        points, contact.status[chosen],
-        view.project(slip) if unrolling is None else unrolling.turn(slip, mesh.points[node[points]]),
+        flat, f"{slave.body}, {slave.name}", places, rows, pressure,
+        points, contact.status[chosen], flat.turn(slip, mesh.points[node[points]]),
         contact.normal_forces(pair), state.scene.contacts[pair].has_friction, hidden,
         _frame(places[first], pressure[first], contact.points.area[chosen], reach),
     )  # fmt: skip
 
 
-def _frame(places: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: float | None) -> Frame:
+def _frame(places: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: float) -> Frame:
     """Return a square around the nodes under pressure with a margin of two facets.
 
     Unless its size is given, it is limited to slightly more than the surface.
@@ -253,7 +279,7 @@ def _frame(places: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: fl
     closed = pressure > 0 if np.any(pressure > 0) else np.ones(len(places), dtype=bool)
     low, high = places[closed].min(axis=0), places[closed].max(axis=0)
     middle = (low + high) / 2
-    if reach is not None:
+    if reach:
         return Frame(middle - reach, middle + reach)
     half = float(np.max(high - low)) / 2 + 2.5 * float(np.sqrt(area.mean()))
     border = 0.1 * min(half, float(np.ptp(places, axis=0).min()))
@@ -282,11 +308,7 @@ def label_axes(axes: Axes, view: View, units: Units, *, mirror: bool = False) ->
 def label_patch(axes: Axes, patch: ContactPatch, units: Units, *, mirror: bool = False) -> None:
     """Show the frame of a contact surface with equal scales, and name its axes; see `label_axes`."""
     patch.frame.fit(axes)
-    if patch.unrolling is None:
-        label_axes(axes, patch.view, units, mirror=mirror)
-    else:
-        across, along = patch.unrolling.labels(units)
-        axes.set(xlabel=across, ylabel=along)
+    patch.flat.label(axes, units, mirror=mirror)
 
 
 def pressure_bar(axes: Axes, clim: tuple[float, float], extend: str, units: Units) -> None:
@@ -305,14 +327,14 @@ MOST_ARROWS = 40
 def draw_traction(
     trace: ContactTrace,
     paper: BinaryIO,
-    window: tuple[tuple[float, float] | None, float | None],
+    window: tuple[Range, float],
     title: str,
     units: Units,
     width: int,
 ) -> None:
     """Draw the pressure above and, where friction acts, the tangential traction on the slave below.
 
-    ``window`` holds the range of the pressure and the extent of the picture, None for automatic ones.
+    ``window`` holds the range of the pressure and the extent of the picture, () and 0 for automatic ones.
     """
     (clim, reach), rubs = window, trace.rubs
     facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
@@ -369,7 +391,7 @@ def _draw_friction(axes: Axes, trace: ContactTrace, units: Units) -> None:
 
 def _draw_slip(axes: Axes, trace: ContactTrace, longest: float) -> None:
     """Draw slip by arrows, at a subset of the points if these are many."""
-    low, high = trace.window(None)
+    low, high = trace.window()
     places = trace.places[trace.points]
     seen = np.flatnonzero((trace.status == Status.SLIP) & (places >= low) & (places <= high))
     seen = seen[np.argsort(places[seen])][:: max(-(-len(seen) // MOST_ARROWS), 1)]
@@ -384,7 +406,7 @@ def _curve(axes: Axes, trace: ContactTrace, values: np.ndarray, colour: str) -> 
 
 
 def _symbols(axes: Axes, trace: ContactTrace, values: np.ndarray) -> None:
-    low, high = trace.window(None)
+    low, high = trace.window()
     seen = int(np.count_nonzero((trace.places > low) & (trace.places < high)))
     size = float(np.clip(60 / max(seen, 1), 0.12, 0.6))
     for status, (name, look) in symbols_of(trace.rubs).items():

@@ -115,7 +115,7 @@ def test_the_trace_of_a_flat_surface_runs_over_x_and_holds_the_forces() -> None:
 
 def test_the_window_of_a_trace_holds_what_is_closed() -> None:
     trace = contact_trace(plane_block(), 0)
-    low, high = trace.window(None)
+    low, high = trace.window()
     closed = trace.places[trace.pressure > 0]
     assert trace.places[0] <= low < closed.min() + 1e-12
     assert closed.max() - 1e-12 < high <= trace.places[-1]
@@ -127,7 +127,7 @@ def test_the_window_of_a_small_contact_holds_the_open_nodes_beside_it() -> None:
     """So that curves end at zero, not in the air."""
     trace = contact_trace(plane_block(), 0)
     small = replace(trace, pressure=np.where(np.isin(np.arange(25), (10, 11, 12)), 1.0, 0.0))
-    assert small.window(None) == (trace.places[9], trace.places[13])
+    assert small.window() == (trace.places[9], trace.places[13])
 
 
 def test_the_trace_of_a_ring_runs_along_it() -> None:
@@ -387,7 +387,7 @@ def test_an_image_keeps_its_proportions_and_its_coordinates() -> None:
 
     def draw(figure: Any) -> None:
         axes = figure.subplots()
-        show_image(axes, image, frame, coordinates=True)
+        show_image(axes, image, frame)
         assert (axes.get_xlim(), axes.get_ylim()) == ((1.0, 4.0), (2.0, 3.0))
         axes.set_axis_off()
 
@@ -584,7 +584,7 @@ def test_status_maps_show_stick_and_slip_of_each_state(tmp_path: Path) -> None:
 
 
 def test_points_without_friction_have_no_arrows() -> None:
-    patch = contact_patches([touching_blocks()], 0, None)[0]
+    patch = contact_patches([touching_blocks()], 0)[0]
     assert 0 < np.count_nonzero(patch.slips) < len(patch.status)
     assert patch.largest_slip > 0.0
     assert replace(patch, rubs=False).largest_slip == 0.0

@@ -49,7 +49,7 @@ from fenics_contact.pictures.section import (
     strongest_contact,
 )
 from fenics_contact.pictures.states import chosen_scale, plot_field
-from fenics_contact.pictures.unrolled import Unrolling, contact_patches, unrolling_of
+from fenics_contact.pictures.unrolled import Projection, Unrolling, contact_patches, unrolling_of
 from tests.pictures.moving_states import pressed_by_a_lid
 from tests.pictures.plane_states import flat_pad, plane_block, ring
 from tests.pictures.states import contains, painted, pixels, pulled, touching_blocks
@@ -187,12 +187,12 @@ def test_pressure_and_status_are_drawn(tmp_path: Path) -> None:
 
 def test_patch_holds_the_points_of_the_pair_where_they_are() -> None:
     state = touching_blocks()
-    patch, contact = contact_patches([state], 0, None)[0], state.contact
+    patch, contact = contact_patches([state], 0)[0], state.contact
     assert len(patch.points) == contact.points.count
     np.testing.assert_allclose(patch.pressure[patch.points], contact.pressure)
     np.testing.assert_array_equal(patch.status, contact.status)
     places = contact_places(state, drawn_bodies(state))
-    np.testing.assert_allclose(patch.places[patch.points], patch.view.project(places))
+    np.testing.assert_allclose(patch.places[patch.points], patch.flat.turn(places, places))
     assert patch.normal_forces.sum == pytest.approx(contact.normal_force.sum())
     slips = contact.status == Status.SLIP
     expected = np.linalg.norm(contact.slip[slips], axis=1)
@@ -202,7 +202,7 @@ def test_patch_holds_the_points_of_the_pair_where_they_are() -> None:
 
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
 def test_refined_patch_keeps_the_integral_of_the_pressure(cell: str) -> None:
-    patch = contact_patches([touching_blocks(cell)], 0, None)[0]
+    patch = contact_patches([touching_blocks(cell)], 0)[0]
     mesh, values = refined(patch.places, patch.facets, patch.pressure)
     corners = np.column_stack([mesh.x, mesh.y])[mesh.triangles]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -467,9 +467,9 @@ def fitted(shift: float = 0.0) -> State:
 
 def test_a_bore_with_pressure_all_around_shows_all_points() -> None:
     state = fitted()
-    (patch,) = contact_patches([state], 0, None)
-    unrolling = patch.unrolling
-    assert unrolling is not None
+    (patch,) = contact_patches([state], 0)
+    unrolling = patch.flat
+    assert isinstance(unrolling, Unrolling)
     assert patch.hidden == 0
     assert patch.behind == ""
     assert len(patch.points) == len(np.unique(patch.points)) == AROUND * (LAYERS + 1)
@@ -494,8 +494,8 @@ def shaft_nodes(state: State) -> int:
 
 def test_slip_around_the_axis_runs_to_the_right() -> None:
     state = fitted()
-    (patch,) = contact_patches([state], 0, None)
-    assert patch.unrolling is not None
+    (patch,) = contact_patches([state], 0)
+    assert isinstance(patch.flat, Unrolling)
     slips = state.contact.status == Status.SLIP
     assert np.count_nonzero(slips) > AROUND
     sizes = np.linalg.norm(state.contact.slip_in_space[slips], axis=1)
@@ -504,24 +504,25 @@ def test_slip_around_the_axis_runs_to_the_right() -> None:
 
 
 def test_the_cut_is_opposite_of_the_largest_force() -> None:
-    (patch,) = contact_patches([fitted(-0.01)], 0, None)
-    assert patch.unrolling is not None
-    assert abs(patch.unrolling.middle) < 0.3, "pushed along −x, the hub presses where x is positive"
+    (patch,) = contact_patches([fitted(-0.01)], 0)
+    assert isinstance(patch.flat, Unrolling)
+    assert abs(patch.flat.middle) < 0.3, "pushed along −x, the hub presses where x is positive"
     assert patch.places[:, 0].max() < np.pi + CELL
     peak = patch.places[np.argmax(patch.pressure), 0]
     assert abs(peak) < 1.0
 
 
 def test_states_in_one_picture_are_unrolled_alike() -> None:
-    patches = contact_patches([fitted(), fitted(-0.01)], 0, None)
-    assert patches[0].unrolling is patches[1].unrolling is not None
+    patches = contact_patches([fitted(), fitted(-0.01)], 0)
+    assert patches[0].flat is patches[1].flat
+    assert isinstance(patches[0].flat, Unrolling)
     np.testing.assert_array_equal(patches[0].places, patches[1].places)
 
 
 def test_points_that_face_away_on_other_surfaces_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fenics_contact.pictures.unrolled.unrolling_of", lambda *_: None)
-    (patch,) = contact_patches([fitted()], 0, None)
-    assert patch.unrolling is None
+    (patch,) = contact_patches([fitted()], 0)
+    assert isinstance(patch.flat, Projection)
     total = AROUND * (LAYERS + 1)
     assert 0.3 * total < patch.hidden < 0.6 * total
     assert patch.hidden + len(patch.points) == total
