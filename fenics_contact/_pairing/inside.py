@@ -295,8 +295,6 @@ class InFacets:
     def of(cls, points: ContactPoints) -> InFacets:
         """Return those of contact points."""
         which = points.are_inside
-        if points.slave_facet is None or points.slave_local is None:
-            return cls.none(points.normal.shape[1])
         relief = points.gap[which] - points.distance[which]
         return cls(which, points.slave_facet[which], points.slave_local[which], relief)
 
@@ -358,7 +356,7 @@ def points_inside(
     on_facet, relief = np.full(points.count, -1), np.zeros(points.count)
     local, none = np.zeros((points.count, places.local.shape[1])), np.zeros(len(which), dtype=np.int64)
     on_facet[which], local[which], relief[which] = places.facet, places.local, places.relief
-    found = replace(points, inside=points.own, slave_facet=on_facet, slave_local=local)
+    found = replace(points, slave_facet=on_facet, slave_local=local)
     found = _put(found, scene, which)
     nearest, of_master = points.axes.copy(), points.facet.copy()
     nearest[which], of_master[which] = reference_axes(found.normal[which]), none - 1
@@ -369,11 +367,9 @@ def points_inside(
 
 def _put(points: ContactPoints, scene: Scene, which: np.ndarray) -> ContactPoints:
     """Return points of which some measure the distance inside facets of their slaves."""
-    assert points.slave_facet is not None
-    assert points.slave_local is not None
     own, master, symmetric = points.own.tolil(), points.master.tolil(), points.symmetric.copy()
     normal, gap, distance = points.normal.copy(), points.gap.copy(), points.distance.copy()
-    tilted, dim = None if points.tilted is None else points.tilted.copy(), points.normal.shape[1]
+    tilted, dim = points.tilted.copy(), points.normal.shape[1]
     for number in np.unique(points.pair[which]):
         chosen = which[points.pair[which] == number]
         inside = InsideOf.of(scene, scene.contacts[int(number)])
@@ -382,9 +378,8 @@ def _put(points: ContactPoints, scene: Scene, which: np.ndarray) -> ContactPoint
         own[chosen], master[chosen], normal[chosen] = met.own, met.master, met.normal
         gap[chosen] = distance[chosen] = met.distance
         symmetric[chosen] = cut[:, :dim]
-        if tilted is not None and inside.slave.planes is not None:
-            tilted[chosen] = cut[:, dim:, None] * inside.slave.planes[dim:]
+        tilted[chosen] = cut[:, dim:, None] * inside.slave.planes[dim:]
     return replace(
-        points, inside=own.tocsr(), master=master.tocsr(), normal=normal, gap=gap, distance=distance,
+        points, own=own.tocsr(), master=master.tocsr(), normal=normal, gap=gap, distance=distance,
         symmetric=symmetric, tilted=tilted,
     )  # fmt: skip

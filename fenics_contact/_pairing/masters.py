@@ -21,8 +21,6 @@ from fenics_contact._pairing.advice import Advice
 from fenics_contact._pairing.points import (
     ContactPoints,
     NodeNumbers,
-    reference_axes,
-    tangent_frames,
     with_symmetry,
 )
 from fenics_contact._pairing.projection import shared_projection
@@ -74,12 +72,14 @@ class Slave:
 
     Attributes:
         number: Which of the pairs of the scene.
+        n_pairs: Number of contact pairs of the scene.
         nodes: Its nodes among those of all bodies, shape (n,).
         movable: Which of them supports leave free in a direction, shape (n,).
         bearing: Which may have a point, shape (n,).
     """
 
     number: int
+    n_pairs: int
     surface: FacetedSurface
     nodes: np.ndarray
     movable: np.ndarray
@@ -89,12 +89,11 @@ class Slave:
         self, chosen: np.ndarray, normal: np.ndarray, gap: np.ndarray, weight: sp.csr_matrix
     ) -> ContactPoints:
         """Return points on chosen nodes, without facets."""
-        count, axes, surface = len(chosen), reference_axes(normal), self.surface
-        return ContactPoints(
-            np.full(count, self.number), self.nodes[chosen], weight, normal, tangent_frames(normal, axes),
-            gap, surface.point_areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)),
-            axes, np.zeros(normal.shape, dtype=bool), gap, np.zeros(count, dtype=bool),
+        surface, pair = self.surface, np.full(len(chosen), self.number)
+        return ContactPoints.at_nodes(
+            pair, self.nodes[chosen], weight, normal, gap, surface.point_areas[chosen],
             length=surface.sizes[chosen] if surface.measure.varies else None,
+            taken=sp.csr_matrix((len(chosen), self.n_pairs), dtype=np.int64),
         )  # fmt: skip
 
 
@@ -508,7 +507,8 @@ class SectorMaster(TiedMaster):
     def points(self, slave: Slave, search: Search) -> ContactPoints:
         """Return points with the rotation of the master's displacement. Collective."""
         points = super().points(slave, search)
-        return replace(points, turns=np.tile(self.pair.matrix(self.angle), (points.count, 1, 1)))
+        turns = np.tile(self.pair.matrix(self.angle), (points.count, 1, 1))
+        return replace(points.as_turned(), turns=turns)
 
     def _check(self, slave: Slave, search: Search) -> None:
         """Reject sides that are not one surface."""

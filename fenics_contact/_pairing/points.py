@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -57,17 +57,15 @@ class ContactPoints:
             [length].
         given: Whether the pair says what the gap is, by a value or by declaring the measured overlap an
             interference, shape (n,).
-        taken: Slave nodes plus one of other pairs that have a point in the same place, which is left out, on
-            a surface beside: their areas are part of that of the point. Shape (n, n_pairs); None: none are.
-        length: `sizes` on bodies of revolution, shape (n,), [length]; None elsewhere, where areas give them.
+        own: Weights of the nodes in the slave's displacement, shape (n, n_nodes): that of its node alone,
+            but for points inside a facet, where a master that is narrower than the cells presses.
+        slave_facet: Which facet of the slave that is, −1 for points at nodes, shape (n,).
+        slave_local: Local coordinates on it, shape (n, dim − 1).
         tilted: Unit normals of planes of symmetry that are not normal to an axis, as `symmetric`, zero where
-            a plane does not cut a point, shape (n, n_planes, dim); None: the scene has none.
-        turns: Rotations R of the master's displacement in that of the slave less R times that of the master,
-            between the sides of sectors, shape (n, dim, dim); None: there are none.
-        inside: `own` where some points lie inside a facet of the slave in place of their node, where a master
-            that is narrower than the cells presses, shape (n, n_nodes); None: all lie at their nodes.
-        slave_facet: Which facet that is, −1 for points at nodes, shape (n,); None: all are.
-        slave_local: Local coordinates on it, shape (n, dim − 1); None likewise.
+            a plane does not cut a point, shape (n, n_planes, dim).
+        taken: Slave nodes plus one of other contact pairs that have a point in the same place, which is left
+            out, on a surface beside: their areas are part of that of the point. Shape (n, n_pairs).
+        length: `sizes` on bodies of revolution, shape (n,), [length]; None elsewhere, where areas give them.
     """
 
     pair: np.ndarray
@@ -83,13 +81,36 @@ class ContactPoints:
     symmetric: np.ndarray
     distance: np.ndarray
     given: np.ndarray
-    taken: sp.csr_matrix | None = None
+    own: sp.csr_matrix
+    slave_facet: np.ndarray
+    slave_local: np.ndarray
+    tilted: np.ndarray
+    taken: sp.csr_matrix
     length: np.ndarray | None = None
-    tilted: np.ndarray | None = None
-    turns: np.ndarray | None = None
-    inside: sp.csr_matrix | None = None
-    slave_facet: np.ndarray | None = None
-    slave_local: np.ndarray | None = None
+
+    @classmethod
+    def at_nodes(
+        cls,
+        pair: np.ndarray,
+        slave: np.ndarray,
+        master: sp.csr_matrix,
+        normal: np.ndarray,
+        gap: np.ndarray,
+        area: np.ndarray,
+        **more: Any,
+    ) -> Self:
+        """Return points at nodes of slaves, by default with what is measured, off facets and planes."""
+        (count, dim), none, axes = normal.shape, np.full(len(slave), -1), reference_axes(normal)
+        at_nodes = sp.csr_matrix((np.ones(count), slave, np.arange(count + 1)), shape=master.shape)
+        values: dict[str, Any] = {
+            "tangents": tangent_frames(normal, axes), "facet": none, "local": np.zeros((count, dim - 1)),
+            "axes": axes, "symmetric": np.zeros((count, dim), dtype=bool), "distance": gap,
+            "given": np.zeros(count, dtype=bool), "own": at_nodes, "slave_facet": none,
+            "slave_local": np.zeros((count, dim - 1)), "tilted": np.zeros((count, 0, dim)),
+            "taken": sp.csr_matrix((count, 0), dtype=np.int64),
+        }  # fmt: skip
+        parts = {"pair": pair, "slave": slave, "master": master, "normal": normal, "gap": gap, "area": area}
+        return cls(**parts, **(values | more))
 
     @property
     def sizes(self) -> np.ndarray:
@@ -103,10 +124,10 @@ class ContactPoints:
         """Number of contact points."""
         return len(self.slave)
 
-    def part(self, chosen: np.ndarray) -> ContactPoints:
+    def part(self, chosen: np.ndarray) -> Self:
         """Return some of the points, by indices or a mask."""
-        names = [each.name for each in fields(self) if getattr(self, each.name) is not None]
-        return ContactPoints(**{name: getattr(self, name)[chosen] for name in names})
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return type(self)(**{name: value[chosen] for name, value in values.items() if value is not None})
 
     def of_surface(self, pair: int, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return slave nodes of a pair whose areas belong to points, ascending, with values of these points.
@@ -114,7 +135,7 @@ class ContactPoints:
         `values`: A value for each point, shape (n,).
         """
         mine = np.flatnonzero(self.pair == pair)
-        if self.taken is None:
+        if not self.taken.nnz:
             return self.slave[mine], values[mine]
         other = self.taken[:, [pair]].tocoo()
         nodes = np.concatenate([self.slave[mine], other.data - 1])
@@ -124,7 +145,7 @@ class ContactPoints:
     @property
     def are_inside(self) -> np.ndarray:
         """Numbers of the points that lie inside a facet of the slave, shape (k,)."""
-        return np.flatnonzero(np.zeros(0) if self.slave_facet is None else self.slave_facet >= 0)
+        return np.flatnonzero(self.slave_facet >= 0)
 
     @property
     def are_at_nodes(self) -> bool:
@@ -137,12 +158,13 @@ class ContactPoints:
         return (self.own - self.master).tocsr()
 
     @property
-    def own(self) -> sp.csr_matrix:
-        """Weights of the nodes in the slave's displacement, shape (n, n_nodes)."""
-        if self.inside is not None:
-            return self.inside
-        entries = np.ones(self.count), self.slave, np.arange(self.count + 1)
-        return sp.csr_matrix(entries, shape=self.master.shape)
+    def turned(self) -> np.ndarray:
+        """Which points compare displacements with those of a master that are turned, shape (n,)."""
+        return np.zeros(self.count, dtype=bool)
+
+    def onto_slave(self, which: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+        """Return vectors at masters of some points as the slave has them, shape (k, dim)."""
+        return vectors
 
     def relative(self, values: np.ndarray, nodes: slice = slice(None)) -> np.ndarray:
         """Return slave minus master displacement, shape (n, dim, ...).
@@ -150,17 +172,11 @@ class ContactPoints:
         `values`: displacements of nodes, shape (n_nodes, dim, ...); `nodes`: which they are, all by default.
         """
         flat, shape = values.reshape(len(values), -1), (self.count, *values.shape[1:])
-        if self.turns is None:
-            return np.asarray(self.jump[:, nodes] @ flat).reshape(shape)
-        own, theirs = (np.asarray(part[:, nodes] @ flat).reshape(shape) for part in (self.own, self.master))
-        return np.asarray(own - np.einsum("nde,ne...->nd...", self.turns, theirs))
+        return np.asarray(self.jump[:, nodes] @ flat).reshape(shape)
 
     def on_nodes(self, force: np.ndarray) -> np.ndarray:
         """Return forces on all nodes for those on the slave at each point, (n, dim) to (n_nodes, dim)."""
-        if self.turns is None:
-            return np.asarray(self.jump.T @ force)
-        back = np.einsum("nde,nd->ne", self.turns, force)
-        return np.asarray(self.own.T @ force - self.master.T @ back)
+        return np.asarray(self.jump.T @ force)
 
     def entries(self, which: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the entries of rows d·(u_slave − R u_master) of some points, sorted by row, then by node.
@@ -169,16 +185,55 @@ class ContactPoints:
 
         Returns row, node, weight and the vector along which the displacement of the node is measured.
         """
-        if self.turns is None:
-            jump = self.jump[which]
-            row = np.repeat(np.arange(len(which)), np.diff(jump.indptr))
-            order = np.lexsort((jump.indices, row))
-            row = row[order]
-            return row, jump.indices[order], jump.data[order], directions[row]
-        parts, back = (
-            (self.own[which], -self.master[which]),
-            np.einsum("nde,nd->ne", self.turns[which], directions),
-        )
+        jump = self.jump[which]
+        row = np.repeat(np.arange(len(which)), np.diff(jump.indptr))
+        order = np.lexsort((jump.indices, row))
+        row = row[order]
+        return row, jump.indices[order], jump.data[order], directions[row]
+
+    def as_turned(self) -> TurnedPoints:
+        """Return the points with rotations that are none."""
+        count, dim = self.normal.shape
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return TurnedPoints(**values, turns=np.tile(np.eye(dim), (count, 1, 1)))
+
+
+@displayed
+@dataclass(frozen=True, kw_only=True)
+class TurnedPoints(ContactPoints):
+    """Points of which some compare both sides of sectors.
+
+    Attributes:
+        turns: Rotations R of the master's displacement in that of the slave less R times that of the master,
+            shape (n, dim, dim).
+    """
+
+    turns: np.ndarray
+
+    @property
+    def turned(self) -> np.ndarray:
+        """Which points lie on sides of sectors, shape (n,)."""
+        return np.asarray((self.turns != np.eye(self.turns.shape[1])).any(axis=(1, 2)))
+
+    def onto_slave(self, which: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+        """Return vectors at masters, turned."""
+        return np.asarray(np.einsum("nde,ne->nd", self.turns[which], vectors))
+
+    def relative(self, values: np.ndarray, nodes: slice = slice(None)) -> np.ndarray:
+        """Return slave minus turned master displacement."""
+        flat, shape = values.reshape(len(values), -1), (self.count, *values.shape[1:])
+        own, theirs = (np.asarray(part[:, nodes] @ flat).reshape(shape) for part in (self.own, self.master))
+        return np.asarray(own - np.einsum("nde,ne...->nd...", self.turns, theirs))
+
+    def on_nodes(self, force: np.ndarray) -> np.ndarray:
+        """Return forces on all nodes."""
+        back = np.einsum("nde,nd->ne", self.turns, force)
+        return np.asarray(self.own.T @ force - self.master.T @ back)
+
+    def entries(self, which: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the entries of rows, those of slaves and of masters."""
+        parts = self.own[which], -self.master[which]
+        back = np.einsum("nde,nd->ne", self.turns[which], directions)
         rows = [np.repeat(np.arange(len(which)), np.diff(part.indptr)) for part in parts]
         along = np.concatenate([directions[rows[0]], back[rows[1]]])
         row, node = np.concatenate(rows), np.concatenate([part.indices for part in parts])
@@ -186,67 +241,30 @@ class ContactPoints:
         weight = np.concatenate([part.data for part in parts])
         return row[order], node[order], weight[order], along[order]
 
+    def as_turned(self) -> TurnedPoints:
+        """Return the points."""
+        return self
+
 
 def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> ContactPoints:
-    """Concatenate the points of several pairs; empty if there are no parts."""
+    """Concatenate the points of several pairs, turned ones if the first are; empty if there are no parts."""
     if not parts:
-        integer = np.zeros(0, dtype=np.int64)
-        return ContactPoints(
-            integer, integer, sp.csr_matrix((0, n_nodes)), np.zeros((0, dim)), np.zeros((0, dim - 1, dim)),
-            np.zeros(0), np.zeros(0), integer, np.zeros((0, dim - 1)), np.zeros((0, dim)),
-            np.zeros((0, dim), dtype=bool), np.zeros(0), np.zeros(0, dtype=bool),
-        )  # fmt: skip
-
+        integer, real = np.zeros(0, dtype=np.int64), np.zeros(0)
+        none = sp.csr_matrix((0, n_nodes))
+        return ContactPoints.at_nodes(integer, integer, none, np.zeros((0, dim)), real, real)
     if len(parts) == 1:
         return parts[0]
-
-    def strung(name: str) -> np.ndarray:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    taken = None
-    if some := [part.taken for part in parts if part.taken is not None]:
-        none = [sp.csr_matrix((part.count, some[0].shape[1])) for part in parts]
-        each = [zero if part.taken is None else part.taken for part, zero in zip(parts, none, strict=True)]
-        taken = sp.vstack(each, format="csr")
-
-    return ContactPoints(
-        strung("pair"), strung("slave"), sp.vstack([part.master for part in parts], format="csr"),
-        strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
-        strung("axes"), strung("symmetric"), strung("distance"), strung("given"), taken,
-        None if all(part.length is None for part in parts) else strung("sizes"),
-        _strung_planes(parts, dim), _strung_turns(parts, dim), *_strung_inside(parts),
-    )  # fmt: skip
-
-
-def _strung_inside(parts: Sequence[ContactPoints]) -> tuple[Any, ...]:
-    """Return where all points lie on their slaves, nothing where all lie at nodes."""
-    if all(part.are_at_nodes for part in parts):
-        return ()
-    facet, local = [], []
-    for part in parts:
-        count, width = part.local.shape
-        facet.append(np.full(count, -1) if part.slave_facet is None else part.slave_facet)
-        local.append(np.zeros((count, width)) if part.slave_local is None else part.slave_local)
-    own = sp.vstack([part.own for part in parts], format="csr")
-    return own, np.concatenate(facet), np.concatenate(local)
-
-
-def _strung_planes(parts: Sequence[ContactPoints], dim: int) -> np.ndarray | None:
-    """Return the oblique planes of symmetry at all points, none where parts have none."""
-    most = max((part.tilted.shape[1] for part in parts if part.tilted is not None), default=0)
-    if not most:
-        return None
-    none = [np.zeros((part.count, most, dim)) for part in parts]
-    each = [zero if part.tilted is None else part.tilted for part, zero in zip(parts, none, strict=True)]
-    return np.concatenate(each)
-
-
-def _strung_turns(parts: Sequence[ContactPoints], dim: int) -> np.ndarray | None:
-    """Return the rotations of all points, identities where parts have none; None if no part has any."""
-    if all(part.turns is None for part in parts):
-        return None
-    every = [np.tile(np.eye(dim), (part.count, 1, 1)) if part.turns is None else part.turns for part in parts]
-    return np.concatenate(every)
+    names = [each.name for each in fields(parts[0]) if each.name not in {"length", "tilted"}]
+    values = {name: [getattr(part, name) for part in parts] for name in names}
+    joined = {
+        name: sp.vstack(each, format="csr") if sp.issparse(each[0]) else np.concatenate(each)
+        for name, each in values.items()
+    }
+    most = max(part.tilted.shape[1] for part in parts)
+    padded = [np.pad(part.tilted, ((0, 0), (0, most - part.tilted.shape[1]), (0, 0))) for part in parts]
+    plain = all(part.length is None for part in parts)
+    length = None if plain else np.concatenate([part.sizes for part in parts])
+    return type(parts[0])(**joined, tilted=np.concatenate(padded), length=length)
 
 
 def reference_axes(normals: np.ndarray) -> np.ndarray:
@@ -255,14 +273,12 @@ def reference_axes(normals: np.ndarray) -> np.ndarray:
     return np.eye(normals.shape[1])[np.argmin(np.round(np.abs(normals), 6), axis=1)]
 
 
-def with_symmetry(points: ContactPoints, marks: np.ndarray, planes: np.ndarray | None) -> ContactPoints:
+def with_symmetry(points: ContactPoints, marks: np.ndarray, planes: np.ndarray) -> ContactPoints:
     """Return points with the planes of symmetry that cut them.
 
-    `marks`: which planes do, shape (n, n_planes); `planes`: their normals, the axes first, or the axes alone.
+    `marks`: which planes do, shape (n, n_planes); `planes`: their normals, the axes first.
     """
     dim = points.normal.shape[1]
-    if planes is None:
-        return replace(points, symmetric=marks)
     return replace(points, symmetric=marks[:, :dim], tilted=marks[:, dim:, None] * planes[dim:])
 
 
@@ -295,16 +311,14 @@ class FreeSpaces:
     def of(cls, points: ContactPoints, fixed: np.ndarray, axes: LocalAxes) -> FreeSpaces:
         """Return those of points; `fixed`: whether components are prescribed, along the axes of nodes."""
         dim, components = points.normal.shape[1], movable(points, fixed)
-        if not axes and points.tilted is None and points.turns is None:
-            return cls(components, np.zeros(0, dtype=np.int64), np.zeros((0, dim, dim)))
-        turned = np.zeros(fixed.shape[0], dtype=bool)
-        turned[axes.nodes] = True
-        touched = np.asarray(abs(points.jump) @ turned.astype(float)) > 0.0
-        if points.tilted is not None:
-            touched |= points.tilted.any(axis=(1, 2))
-        if points.turns is not None:
-            touched |= (points.turns != np.eye(dim)).any(axis=(1, 2))
+        touched = points.tilted.any(axis=(1, 2)) | points.turned
+        if axes:
+            turned = np.zeros(fixed.shape[0], dtype=bool)
+            turned[axes.nodes] = True
+            touched |= np.asarray(abs(points.jump) @ turned.astype(float)) > 0.0
         at = np.flatnonzero(touched)
+        if not len(at):
+            return cls(components, at, np.zeros((0, dim, dim)))
         square, every = np.zeros((len(at), dim, dim)), np.zeros(len(at))
         moved = []
         for axis in range(dim):
@@ -316,8 +330,7 @@ class FreeSpaces:
         value, vector = np.linalg.eigh(square / every[:, None, None])
         held = np.einsum("nda,na,nea->nde", vector, value <= HELD**2, vector)
         across = np.eye(dim) * points.symmetric[at][:, :, None]
-        if points.tilted is not None:
-            across = across + np.einsum("npd,npe->nde", points.tilted[at], points.tilted[at])
+        across = across + np.einsum("npd,npe->nde", points.tilted[at], points.tilted[at])
         value, vector = np.linalg.eigh(held + across)
         return cls(components, at, np.einsum("nda,na,nea->nde", vector, value <= HELD, vector))
 
@@ -559,9 +572,10 @@ def shared_once(points: ContactPoints, scene: Scene, advice: Notices, comm: MPI.
     kept, lost = _shared(points, scene)
     words = "the contact of %s leaves out %s, where force and friction are those of %s at the same places"
     advice.left_out(words, (scene.contacts, points, lost), (scene.contacts, points, kept), comm)
+    if not len(lost):
+        return points
     area, taken = areas_taken(points, (kept, lost), scene)
-    if points.taken is not None:
-        taken = taken.maximum(points.taken)  # not their sum: entries are numbers of nodes
+    taken = points.taken.maximum(taken)  # not their sum: entries are numbers of nodes
     points = replace(points, area=points.area + area, taken=taken)
     return points.part(np.setdiff1d(np.arange(points.count), lost))
 

@@ -138,6 +138,8 @@ def find_tied_points(
         master = master_of(scene, tie, partial(surface_of, scene, geometry=tie.geometry))
         points = _faced(search, number, slave, master, np.ones(len(slave.nodes), dtype=bool))
         parts.append(_in_frames(points, search, tie))
+    if scene.sectors:
+        parts = [points.as_turned() for points in parts]
     return join_points(parts, scene.components, len(fixed))
 
 
@@ -172,7 +174,9 @@ def _faced(
     nodes = NodeNumbers.of(scene).global_nodes(side.body, surface.nodes)
     movable = ~search.fixed[nodes].all(axis=1) & master.movable(scene, nodes)
     search.advice.surface(scene, side, pair.geometry, surface, comm)
-    points = master.points(Slave(number, surface, nodes, movable, movable & bearing), search)
+    points = master.points(
+        Slave(number, len(scene.contacts), surface, nodes, movable, movable & bearing), search
+    )
     if comm.rank == 0 and not movable.all():
         safe_log(
             _LOG.info,

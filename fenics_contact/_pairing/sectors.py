@@ -127,8 +127,7 @@ def around_once(
     cosine = np.asarray(mine.multiply(theirs).sum(axis=1)).ravel() / np.maximum(
         lengths[0] * lengths[1], np.finfo(float).tiny
     )
-    assert tied.turns is not None
-    normal = np.einsum("nde,ne->nd", tied.turns[by], onto @ points.normal)
+    normal = tied.onto_slave(by, onto @ points.normal)
     along = np.einsum("nd,nd->n", normal, points.normal[here])
     lost = np.flatnonzero(every & (cosine > same_place) & (along > PARALLEL))
     return here[lost], onto[lost]
@@ -152,8 +151,6 @@ def without_repeated(
         largest = np.asarray(onto.argmax(axis=1)).ravel()
         count = len(scene.contacts)
         entries = points.slave[lost] + 1, (largest, points.pair[lost])
-        taken = sp.csr_matrix(entries, shape=(points.count, count))
-        if points.taken is not None:
-            taken = taken.maximum(points.taken)
+        taken = points.taken.maximum(sp.csr_matrix(entries, shape=(points.count, count)))
         points = replace(points, area=area, taken=taken)
     return points.part(np.setdiff1d(np.arange(points.count), lost))

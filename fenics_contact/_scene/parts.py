@@ -344,14 +344,14 @@ def _require_different(pairs: Sequence[ContactPair | AnyTie]) -> None:
 TILT = 1e-9
 
 
-def planes_of(scene: SceneParts) -> np.ndarray | None:
-    """Return the normals of planes of symmetry, the axes first, (n_planes, dim); None: the axes alone."""
+def planes_of(scene: SceneParts) -> np.ndarray:
+    """Return the normals of planes of symmetry, the axes first, shape (n_planes, dim)."""
     planes = [*np.eye(scene.dim)]
     for support in scene.supports:
         normal = _plane(scene, support)
         if normal is not None and np.max(np.abs(planes @ normal)) < 1.0 - TILT:
             planes.append(normal)
-    return np.array(planes) if len(planes) > scene.dim else None
+    return np.array(planes)
 
 
 def _plane(scene: SceneParts, support: AnySupport) -> np.ndarray | None:
@@ -369,11 +369,9 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
     """Return which nodes of a body lie on which plane of symmetry, shape (n_nodes, n_planes).
 
     A plane of symmetry is a flat side on which a support prescribes only the component normal to it. The
-    columns are those of `planes_of`, by default of planes normal to the axes. On the axis of revolution
-    surfaces have none that is normal to it.
+    columns are those of `planes_of`. On the axis of revolution surfaces have none that is normal to it.
     """
     mesh, planes = scene.bodies[body].mesh, planes_of(scene)
-    planes = np.eye(scene.dim) if planes is None else planes
     marks = np.zeros((mesh.n_nodes, len(planes)), dtype=bool)
     for support in scene.supports:
         if support.body != body or isinstance(support, RigidSurface | ToolMotion):

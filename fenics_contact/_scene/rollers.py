@@ -14,7 +14,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 
 
 def held_directions(
-    mesh: BodyMesh, roller: Roller, mirrored: np.ndarray, planes: np.ndarray | None
+    mesh: BodyMesh, roller: Roller, mirrored: np.ndarray, planes: np.ndarray
 ) -> HeldDirections:
     """Return along what a roller holds which nodes, and by how much they move.
 
@@ -49,7 +49,7 @@ def _given(roller: Roller, points: np.ndarray) -> np.ndarray:
 
 
 def _normals(
-    mesh: BodyMesh, surface: str, mirrored: np.ndarray, planes: np.ndarray | None
+    mesh: BodyMesh, surface: str, mirrored: np.ndarray, planes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes of a curved surface and unit normals there, on an edge of it one of either side."""
     faceted = true_surface(mesh, surface, "best", mirrored=mirrored, planes=planes)

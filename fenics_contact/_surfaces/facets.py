@@ -298,7 +298,7 @@ class FacetedSurface:
         whole: The facets that were cut into these, as rows of positions in ``nodes``, quadratic ones, or
             triangles and quadrilaterals together; None if they are whole.
         measure: What is a length or an area.
-        planes: Unit normals of the planes of symmetry, shape (n_planes, dim); None: they are the axes.
+        planes: Unit normals of the planes of symmetry, the axes first, shape (n_planes, dim).
         followed: What makes values at hanging nodes the means of their masters', shape (n, n); None without
             any.
         by_pieces: Whether the areas of nodes are those of the linear pieces around them, all of them
@@ -315,10 +315,10 @@ class FacetedSurface:
     averaged: np.ndarray
     areas: np.ndarray
     mirrored: np.ndarray
+    planes: np.ndarray
     relief: Relief | None = None
     whole: np.ndarray | None = None
     measure: Measure = PLAIN
-    planes: np.ndarray | None = None
     followed: sp.csr_matrix | None = None
     by_pieces: bool = False
     mixed: MixedPieces | None = None
@@ -330,7 +330,7 @@ class FacetedSurface:
 
     def across(self, vectors: np.ndarray) -> np.ndarray:
         """Return the components of vectors across all planes of symmetry, shape (n, n_planes)."""
-        return vectors if self.planes is None else np.asarray(vectors @ self.planes.T)
+        return np.asarray(vectors @ self.planes.T)
 
     @cached_property
     def normals(self) -> np.ndarray:
@@ -409,7 +409,7 @@ class FacetedSurface:
 
 
 def within_planes(
-    vectors: np.ndarray, marks: np.ndarray, planes: np.ndarray | None, same: float = 1e-6
+    vectors: np.ndarray, marks: np.ndarray, planes: np.ndarray, same: float = 1e-6
 ) -> np.ndarray:
     """Return vectors without their components across planes, shape (n, dim).
 
@@ -417,7 +417,7 @@ def within_planes(
     """
     dim = vectors.shape[1]
     result = np.where(marks[:, :dim], 0.0, vectors)
-    if planes is None:
+    if len(planes) == dim:
         return result
     across = [np.where(marks[:, axis, None], np.eye(dim)[axis], 0.0) for axis in range(dim)]
     for normal, marked in zip(planes[dim:], marks[:, dim:].T, strict=True):
@@ -440,7 +440,8 @@ def faceted_surface(
     """Build the surface from the coordinates of a body and rows of its node numbers.
 
     On a plane of symmetry the average includes the facets of the mirror image: the normals lie in it.
-    `mirrored`: which nodes lie on which plane of symmetry, by default none.
+    `mirrored`: which nodes lie on which plane of symmetry, by default none; `planes`: their normals, by
+    default the axes.
     """
     corners, dim = facets.shape[1], points.shape[1]
     if (corners, dim) not in {(2, 2), (3, 3), (4, 3)}:
@@ -455,6 +456,7 @@ def faceted_surface(
     summed = np.zeros_like(own)
     np.add.at(summed, local, products)
     flat = np.zeros(own.shape, dtype=bool) if mirrored is None else mirrored[nodes]
+    planes = np.eye(dim) if planes is None else planes
     within = within_planes(summed, flat, planes)
     # A surface that lies in the plane itself is not cut by it.
     flat &= (np.linalg.norm(within, axis=1) > CUT * np.linalg.norm(summed, axis=1))[:, None]
@@ -467,7 +469,7 @@ def faceted_surface(
             "area there or fold back: correct the mesh, or leave these facets out of the surface"
         )
     averaged = summed / size[:, None]
-    return FacetedSurface(nodes, local, own, averaged, _linear_areas(own, local), flat, planes=planes)
+    return FacetedSurface(nodes, local, own, averaged, _linear_areas(own, local), flat, planes)
 
 
 def _linear_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:

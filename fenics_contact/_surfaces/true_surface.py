@@ -164,8 +164,7 @@ def _joints_with_images(surface: FacetedSurface) -> list[Joints]:
     corner, joints = np.arange(count * corners).reshape(count, corners), []
     summed = corner_products(surface.points, surface.facets).sum(axis=1)
     unit = summed / np.linalg.norm(summed, axis=1)[:, None]
-    planes = np.eye(surface.dim) if surface.planes is None else surface.planes
-    for number, plane in enumerate(planes):
+    for number, plane in enumerate(surface.planes):
         there = surface.mirrored[surface.facets, number]
         if corners > 2:
             there &= np.roll(there, -1, axis=1)
@@ -270,8 +269,7 @@ def _fitted(
         some = slice(start, start + most)
         pairs = slice(*np.searchsorted(centre, (start, start + most)))
         away = surface.points[wedges.node[around[pairs]]] - surface.points[wedges.node[centre[pairs]]]
-        planes = np.eye(surface.dim) if surface.planes is None else surface.planes
-        patch = _with_mirror_images(away, centre[pairs] - start, mirrored[some], planes)
+        patch = _with_mirror_images(away, centre[pairs] - start, mirrored[some], surface.planes)
         normal[some], in_space[some] = _fit_around(*patch, mean[some], axes[some], narrow[some], order)
     normal = surface.within(normal, mirrored)
     return normal / np.linalg.norm(normal, axis=1)[:, None], in_space
@@ -360,11 +358,11 @@ def true_surface(
         order, geometry = (2 if geometry == "faceted" else 3), "best"
     if geometry == "faceted":
         return surface
-    key = (name, geometry, order, marks.tobytes(), None if planes is None else planes.tobytes())
+    key = (name, geometry, order, marks.tobytes(), surface.planes.tobytes())
     known = _KNOWN.setdefault(mesh.origin, {})
     if key not in known:
         shape = mesh.origin.shapes.get(name) if geometry == "best" else None
-        known[key] = _relief(mesh.origin, name, (marks, planes), shape, order)
+        known[key] = _relief(mesh.origin, name, (marks, surface.planes), shape, order)
     return replace(surface, relief=known[key])
 
 
@@ -387,7 +385,7 @@ def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str, measure: Mea
 def _relief(
     mesh: BodyMesh,
     name: str,
-    mirrors: tuple[np.ndarray, np.ndarray | None],
+    mirrors: tuple[np.ndarray, np.ndarray],
     shape: SurfaceShape | None,
     order: int,
 ) -> Relief | None:

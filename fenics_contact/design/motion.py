@@ -247,7 +247,7 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
     for section in body.mesh.cuts.values():
         held[section.pairs] = True
     held[design.nodes_beyond_transition(body.mesh, cut)] = True
-    tilted = None if planes is None else (cut, planes)
+    tilted = None if len(planes) == scene.dim else (cut, planes)
     return MeshMotion(decomposition, name, body, design.lattice.nodes, held, tilted)
 
 

@@ -166,7 +166,7 @@ class _Patches:
         self, plane: int, use: np.ndarray, away: np.ndarray, origin: np.ndarray, reach: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Add the images of nodes across a plane of symmetry that lie within reach."""
-        normal = np.eye(away.shape[1])[plane] if self.slave.planes is None else self.slave.planes[plane]
+        normal = self.slave.planes[plane]
         on_plane = self.slave.mirrored[self.node[use], plane]
         height = (away - away[np.flatnonzero(on_plane)[0]]) @ normal
         images = away - 2.0 * height[:, None] * normal

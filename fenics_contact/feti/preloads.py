@@ -14,8 +14,6 @@ from fenics_contact._pairing.points import (
     ContactPoints,
     NodeNumbers,
     join_points,
-    reference_axes,
-    tangent_frames,
 )
 from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, free_part
 from fenics_contact._scene.scene import Scene
@@ -182,12 +180,8 @@ def _section_points(
         normals = np.tile(normal, (count, 1))
         master = sp.csr_matrix((np.ones(count), before, np.arange(count + 1)), shape=(count, numbers.n_nodes))
         nothing = np.zeros(count)
-        points = ContactPoints(
-            np.full(count, number), behind, master, normals, tangent_frames(normals),
-            nothing, nothing, np.full(count, -1), np.zeros((count, scene.components - 1)),
-            reference_axes(normals), np.zeros(normals.shape, dtype=bool), nothing, np.ones(count, dtype=bool),
-        )  # fmt: skip
-        found.append(points)
+        given, pair = np.ones(count, dtype=bool), np.full(count, number)
+        found.append(ContactPoints.at_nodes(pair, behind, master, normals, nothing, nothing, given=given))
     return join_points(found, scene.components, numbers.n_nodes)
 
 
@@ -217,9 +211,7 @@ def _once_at_sections(
         return points
     dropped, left = np.concatenate(lost), np.concatenate(kept)
     entries = points.slave[dropped] + 1, (left, points.pair[dropped])
-    taken = sp.csr_matrix(entries, shape=(points.count, len(scene.contacts)))
-    if points.taken is not None:
-        taken = points.taken.maximum(taken)
+    taken = points.taken.maximum(sp.csr_matrix(entries, shape=points.taken.shape))
     area = points.area + np.bincount(left, points.area[dropped], points.count)
     rest = np.setdiff1d(np.arange(points.count), dropped)
     return replace(points, area=area, taken=taken).part(rest)

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._pairing.following import means_on_masters
-from fenics_contact._pairing.points import ContactPoints, NodeNumbers, tangent_frames
+from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.springs import Spring, mean_weights
@@ -96,8 +96,5 @@ def spring_points(springs: Sequence[Spring], scene: Scene, numbers: NodeNumbers)
     master = sp.csr_matrix((value, (row, column)), shape=(count, n_nodes))
     nothing = np.zeros(count)
     normals = np.tile(np.eye(dim)[0], (count, 1))
-    return ContactPoints(
-        np.arange(count), slaves, master, normals, tangent_frames(normals), nothing, nothing,
-        np.full(count, -1), np.zeros((count, dim - 1)), np.tile(np.eye(dim)[1], (count, 1)),
-        np.zeros((count, dim), dtype=bool), nothing, np.ones(count, dtype=bool),
-    )  # fmt: skip
+    given = np.ones(count, dtype=bool)
+    return ContactPoints.at_nodes(np.arange(count), slaves, master, normals, nothing, nothing, given=given)

@@ -50,7 +50,7 @@ def test_fine_meshes_touch_at_nodes(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         state = solve_scene(pressed_on_disc(0.37, 0.075), MPI.COMM_SELF, tolerance=1e-8)
     assert not any(isinstance(each, BetweenNodes) for each in state.peak_uncertainties)
-    assert state.torn.points.inside is None
+    assert state.torn.points.are_at_nodes
     assert state.contact.normal_force.sum() > 0.0
     assert not [each for each in caplog.messages if "between nodes" in each]
 

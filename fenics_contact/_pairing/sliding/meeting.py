@@ -18,8 +18,6 @@ from fenics_contact._pairing.points import (
     ContactPoints,
     NodeNumbers,
     are_beside,
-    reference_axes,
-    tangent_frames,
 )
 from fenics_contact._pairing.sliding.closest import moved_surface
 from fenics_contact._pairing.sliding.slip import LastPoints, MaterialPoints
@@ -132,12 +130,12 @@ class Candidates:
         self, chosen: np.ndarray, normal: np.ndarray, distance: np.ndarray, weights: sp.csr_matrix
     ) -> ContactPoints:
         """Return points at candidates, without facets."""
-        count, axes = len(chosen), reference_axes(normal)
-        return ContactPoints(
-            np.full(count, self.number), self.nodes[chosen], weights, normal, tangent_frames(normal, axes),
-            distance + self.offset[chosen], self.area[chosen], np.full(count, -1),
-            np.zeros((count, normal.shape[1] - 1)), axes, np.zeros(normal.shape, dtype=bool), distance,
-            self.given[chosen], self.taken[chosen],
+        own, pair, gap = self.own[chosen], np.full(len(chosen), self.number), distance + self.offset[chosen]
+        entries = own.data, self.slave_nodes[own.indices], own.indptr
+        return ContactPoints.at_nodes(
+            pair, self.nodes[chosen], weights, normal, gap, self.area[chosen], distance=distance,
+            given=self.given[chosen], own=sp.csr_matrix(entries, shape=weights.shape),
+            slave_facet=self.on_facet[chosen], slave_local=self.on_local[chosen], taken=self.taken[chosen],
         )  # fmt: skip
 
     def joined_to(self, lost: np.ndarray, kept: np.ndarray) -> Self:

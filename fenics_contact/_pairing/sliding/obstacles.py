@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._pairing.masters import ObstacleMaster
-from fenics_contact._pairing.points import ContactPoints, with_symmetry
+from fenics_contact._pairing.points import with_symmetry
 from fenics_contact._pairing.sliding.meeting import Found, Moved, SlidingPair
 from fenics_contact._pairing.sliding.stiffness import without_patches
 from fenics_contact._scene.pairs import ContactPair
@@ -46,16 +46,6 @@ class OnObstacle(SlidingPair):
         chosen = np.flatnonzero(facing & (gap <= moved.reach))
         curvature = evaluate_shape(shape, "curvatures", place[chosen])
         none = sp.csr_matrix((len(chosen), len(coordinates)))
-        points = self._where_they_lie(self.points(chosen, normal[chosen], gap[chosen], none), chosen)
+        points = self.points(chosen, normal[chosen], gap[chosen], none)
         points = with_symmetry(points, self.cut[chosen], self.slave.planes)
         return Found(points, without_patches(curvature, len(coordinates)))
-
-    def _where_they_lie(self, points: ContactPoints, chosen: np.ndarray) -> ContactPoints:
-        """Return points of candidates that may lie inside facets of the slave."""
-        if (self.on_facet < 0).all():
-            return points
-        own = self.own[chosen].tocoo()
-        entries = own.data, (own.row, self.slave_nodes[own.col])
-        inside = sp.csr_matrix(entries, shape=points.master.shape)
-        facet, local = self.on_facet[chosen], self.on_local[chosen]
-        return replace(points, inside=inside, slave_facet=facet, slave_local=local)
