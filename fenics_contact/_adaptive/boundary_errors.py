@@ -16,7 +16,6 @@ from fenics_contact._scene.loads import Load, Traction
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface, corner_places, heights
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean
@@ -73,7 +72,7 @@ def _moved(scene: Scene, step: float) -> Scene | None:
     """Return the scene with a part of the way of all curved boundaries to their true shapes, None without."""
     moved = {}
     for name, body in scene.bodies.items():
-        if body.mesh.order > 1 or isinstance(body, ToolBody):
+        if body.mesh.order > 1 or body.is_rigid:
             continue
         if body.mesh.origin.chart is not None:
             way = boundary_defect(body.mesh.origin)

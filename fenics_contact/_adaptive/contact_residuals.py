@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact._scene.obstacles import RigidTool
-from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.parts import slave_of, surface_of
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface, has_midside_pressure, heights, shape_functions
 from fenics_contact._surfaces.projection import Projection, interpolated_normal, node_weights, project
 from fenics_contact.design.objective import Partials
@@ -168,9 +166,9 @@ def _opposite(
     torn, scene, field = state.torn, state.torn.scene, state.conforming_displacement
     decomposition = torn.decomposition
     tearing, comm = decomposition.tearing, decomposition.comm
-    if isinstance(pair.master, Surface):
-        master = surface_of(scene, pair.master, pair.geometry)
-        nodes = tearing.global_nodes(pair.master.body, master.nodes)
+    if pair.between_bodies:
+        master = surface_of(scene, pair.master_surface, pair.geometry)
+        nodes = tearing.global_nodes(pair.master_surface.body, master.nodes)
         moved = nodal_mean_at(decomposition, field, nodes)
         with together(comm):
             found = _along(places, along, master) if pair.by_mortar else _nearest(places, master)
@@ -178,13 +176,12 @@ def _opposite(
         return found_at, gap, normal, weights @ moved
     every = np.arange(len(places.points))
     with together(comm):
-        gap = evaluate_shape(pair.master, "distance", places.points)
-        normal = evaluate_shape(pair.master, "normals", places.points)
+        gap = evaluate_shape(pair.obstacle, "distance", places.points)
+        normal = evaluate_shape(pair.obstacle, "normals", places.points)
     moved = np.zeros_like(places.points)
-    if isinstance(pair.master, RigidTool):
-        body = scene.bodies[pair.master.name]
-        assert isinstance(body, ToolBody)
-        nodes = tearing.global_nodes(pair.master.name, np.arange(body.mesh.n_nodes))
+    if pair.tool:
+        body = scene.tools[pair.tool]
+        nodes = tearing.global_nodes(pair.tool, np.arange(body.mesh.n_nodes))
         moved = body.weights(places.points) @ nodal_mean_at(decomposition, field, nodes)
     return every, gap, normal, moved
 

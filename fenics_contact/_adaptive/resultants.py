@@ -10,7 +10,6 @@ import numpy as np
 from fenics_contact._base.checks import GivenVector, checked, unit_vector
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.local_axes import free_part
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.objective import Partials, Weighable, require_linear
 from fenics_contact.design.objectives import on_rows, require_pair
@@ -94,7 +93,7 @@ class SupportForce(Weighable):
                 f"SupportForce needs a supported surface, got {f'{self.body} {self.surface}'!r}: the scene's "
                 f"supports hold {', '.join(map(repr, known)) or 'none'}"
             )
-        if isinstance(scene.bodies[self.body], ToolBody):
+        if scene.bodies[self.body].is_rigid:
             raise InvalidInputError(
                 f"SupportForce needs a support of a body that deforms, {self.body!r} is a rigid tool: take "
                 "the force of its contact pair"

@@ -10,7 +10,6 @@ import numpy as np
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refined_again
 from fenics_contact._adaptive.underresolved_contact import cells_at
 from fenics_contact._pairing.points import NodeNumbers
-from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.objective import Objective, WeightedSum
 from fenics_contact.design.objectives import FrictionWork
@@ -44,8 +43,8 @@ def refined_at_sticking_ends(
         for number, places in ((n, each) for n, each in ends.items() if len(each)):
             pair = scene.contacts[number]
             least = finest * float(np.ptp(scene.bodies[pair.slave.body].mesh.points, axis=0).max())
-            for side in (pair.slave, pair.master):
-                if isinstance(side, Surface) and not halves_together(mesh := scene.bodies[side.body].mesh):
+            for side in pair.surfaces:
+                if not halves_together(mesh := scene.bodies[side.body].mesh):
                     marked.setdefault(side.body, []).append(cells_at(mesh, places, least))
         return {name: reduce(np.union1d, cells) for name, cells in marked.items()}
 

@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.pair_geometry import hertz_spot, modulus_of, whole_force
-from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -82,11 +81,10 @@ class _Spot:
         mine, first = contact.on_pair(number), NodeNumbers.of(scene).first_of(pair.slave.body)
         nodes, name = contact.points.slave[mine] - first, pair.slave.body
         places, shown = (each.bodies[name].mesh.points[nodes] for each in (state.scene, scene))
-        sides = [pair.slave, *([pair.master] if isinstance(pair.master, Surface) else [])]
         pressing = contact.normal_force[mine] > 0.0
         if not pressing.any():  # it touches between nodes: those that come nearest are around
             pressing[np.argmin(contact.gap[mine])] = True
-        bodies = tuple(dict.fromkeys(side.body for side in sides))
+        bodies = tuple(dict.fromkeys(side.body for side in pair.surfaces))
         return cls(bodies, shown[pressing], _half_width(state, number, places))
 
 

@@ -40,7 +40,6 @@ from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.local_axes import free_part
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import RigidSurface
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import nodal_mean_transposed, nodal_sum
@@ -408,7 +407,7 @@ def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
 
 def _require_elastic(scene: Scene) -> None:
     """Reject rigid tools on bodies that are nonlinear with small displacements."""
-    if not scene.deforms_much and any(isinstance(body, ToolBody) for body in scene.bodies.values()):
+    if not scene.deforms_much and scene.tools:
         raise InvalidInputError(
             "a RigidTool needs linear materials or those for large deformations, got materials that are "
             "nonlinear with small displacements: give a body a material for large deformations"

@@ -43,8 +43,8 @@ def coarse_peak(
     if count <= few:
         return CoarsePeak(pair.place, count, 1)
     around, wide = slave.facets[(slave.facets == top).any(axis=1)], np.zeros((0, 1, scene.dim))
-    if isinstance(pair.master, Surface):
-        wide = _facets_of_master(state, pair.master, int(mine[first]))
+    if pair.between_bodies:
+        wide = _facets_of_master(state, pair.master_surface, int(mine[first]))
     limit = most * max(1.0, _longest(wide) / _longest(slave.points[around]))
     grown = np.full(len(slave.nodes), np.nan)
     grown[node[~pressing]] = contact.gap[mine[~pressing]] - contact.gap[mine[first]]
@@ -66,7 +66,7 @@ def unmatched_nodes(state: State, number: int, alone: float = 0.99) -> Unmatched
     `alone`: weight of a node of the master above which a point lies on it.
     """
     contact, pair = state.contact, state.scene.contacts[number]
-    if pair.by_mortar or pair.is_self_contact or not isinstance(pair.master, Surface):
+    if pair.by_mortar or pair.is_self_contact or not pair.between_bodies:
         return None
     mine = contact.on_pair(number)
     weights = contact.points.master[mine[contact.normal_force[mine] > 0.0]]

@@ -20,7 +20,6 @@ from fenics_contact._equilibrium.previous import ONLY_STEP, Equilibria, NoEquili
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._equilibrium.warnings import ContactWarnings
 from fenics_contact._scene.memory import Fit
-from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.plan import SolverKind, choose_solver
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import InvalidInputError, collectively, together
@@ -385,7 +384,7 @@ def _require_obstacles_at(scene: Scene, time: float) -> None:
     if scene.deforms_much:
         return
     for pair in scene.contacts:
-        if isinstance(pair.master, MovingObstacle) and not pair.master.is_where_it_was(time):
+        if not all(each.is_where_it_was(time) for each in pair.moving):
             raise InvalidInputError(
                 f"with small displacements obstacles must not move, but that of {pair.place} has moved by "
                 f"time {time:g}: move the bodies against it, or give one a material for large deformations"

@@ -12,8 +12,7 @@ import scipy.sparse as sp
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
-from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.plan import MOTION_ROUNDING, held_components, point_loads, resisted_motions
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.errors.ranks import on_root_then_bcast
@@ -489,7 +488,7 @@ def _of_contact(torn: TornSystem, bodies: list[RigidBody]) -> list[sp.csc_matrix
     normal = sp.vstack([body.contact_wrenches(torn) for body in bodies]).tocsc()
     found = []
     for number, pair in enumerate(torn.scene.contacts):
-        if pair.has_friction or isinstance(pair.master, MovingObstacle):
+        if pair.has_friction or pair.moving:
             found.append(_of_any(torn, pair, names))
         else:
             found.append(normal[:, np.flatnonzero(torn.points.pair == number)])
@@ -503,11 +502,9 @@ def _of_any(torn: TornSystem, pair: ContactPair, names: list[str]) -> sp.csc_mat
     size = slave.rigid_modes(at).shape[2]
     length = len(at) * slave.components
     result = np.zeros((len(names), size, length))
-    for side, sign in ((pair.slave, 1.0), (pair.master, -1.0)):
-        name = side.body if isinstance(side, Surface) else side.name if isinstance(side, RigidTool) else None
-        if name is not None:
-            modes = torn.scene.bodies[name].rigid_modes(at)
-            result[names.index(name)] += sign * modes.reshape(length, size).T
+    for name, sign in zip(pair.bodies, (1.0, -1.0), strict=False):
+        modes = torn.scene.bodies[name].rigid_modes(at)
+        result[names.index(name)] += sign * modes.reshape(length, size).T
     return sp.csc_matrix(result.reshape(-1, length))
 
 

@@ -345,7 +345,7 @@ def _slid_far(state: State, number: int) -> list[Doubt]:
     """
     contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
     mine = contact.on_pair(number)
-    if not isinstance(pair.master, Surface):
+    if not pair.between_bodies:
         return []
     # Around an axis of revolution surfaces are alike.
     slid = np.linalg.norm(contact.total_slip[mine][:, : scene.dim - 1], axis=1)
@@ -354,8 +354,10 @@ def _slid_far(state: State, number: int) -> list[Doubt]:
     farthest, reach = float(slid.max(initial=0.0)), float(np.linalg.norm(np.ptp(places, axis=0)))
     if farthest > reach:
         return [Doubt(number, Kind.SLIDING, _words_of_sliding(pair, farthest, reach))]
-    master = scene.bodies[pair.master.body].mesh
-    area = float(share_areas(master, pair.master.name).sum()) / len(master.surfaces[pair.master.name])
+    master = scene.bodies[pair.master_surface.body].mesh
+    area = float(share_areas(master, pair.master_surface.name).sum()) / len(
+        master.surfaces[pair.master_surface.name]
+    )
     pressed, facet = slid[contact.normal_force[mine] > 0.0].max(initial=0.0), area ** (1.0 / (scene.dim - 1))
     words = _words_of_facets_slid(pair, pressed, facet)
     return [Doubt(number, Kind.FACETS_SLID, words)] if pressed > facet else []
@@ -441,14 +443,9 @@ def _finer_gap(torn: TornSystem) -> np.ndarray:
 def _passing_nodes(state: State, number: int, moved: float) -> list[Doubt]:
     """Return the doubt about a pair whose master passes between the nodes of its slave. Collective."""
     pair = state.scene.contacts[number]
-    if (
-        pair.by_mortar
-        or not isinstance(pair.master, Surface)
-        or pair.is_self_contact
-        or pair.nodes is not None
-    ):
+    if pair.by_mortar or not pair.between_bodies or pair.is_self_contact or pair.single_nodes:
         return []
-    deep = _depth(state, number, pair, pair.master)
+    deep = _depth(state, number, pair, pair.master_surface)
     if pair.closure is not None:
         deep += float(state.contact.gap[state.contact.on_pair(number)].min(initial=0.0))
     if deep <= SHARE * moved:
@@ -469,12 +466,12 @@ def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> l
     """
     contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
     presses = contact.normal_force[contact.on_pair(number)].any()
-    if presses or not pair.by_mortar or not isinstance(pair.master, Surface) or pair.given_gap:
+    if presses or not pair.by_mortar or pair.given_gap:
         return []
-    slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, pair.master))
+    slave, master = (surface_of(scene, side, pair.geometry) for side in pair.surfaces)
     hit = project(slave.points, slave.normals, master)
     own = _moves(state, pair.slave)[slave.nodes[hit.point]]
-    other = _moves(state, pair.master)[master.nodes]
+    other = _moves(state, pair.master_surface)[master.nodes]
     gap = hit.gap + np.einsum("nd,nd->n", hit.normal, own - node_weights(master, hit) @ other)
     deep = -float(gap.min(initial=0.0))
     if deep <= most * moved:
@@ -536,16 +533,16 @@ def _on_ends(last: State) -> str:
     total = contact.normal_force.sum()
     for index, pair in enumerate(last.scene.contacts):
         mine = np.flatnonzero((points.pair == index) & (points.facet >= 0) & (contact.normal_force > 0.0))
-        if isinstance(pair.master, Surface) and len(mine):
-            corners = last.scene.facets(pair.master).shape[1]
+        if pair.between_bodies and len(mine):
+            corners = last.scene.facets(pair.master_surface).shape[1]
             beyond = mine[outside(points.local[mine], corners) > 0.0]
             share = contact.normal_force[beyond].sum() / total
             if share > 0.0:
                 surface = f"of surface {pair.slave.name!r}"
                 nodes = counted(len(beyond), f"node {surface} presses", f"nodes {surface} press")
                 found.append(
-                    f"; {nodes} on {pair.master.name!r} from beyond its end with {share:.1%} of the normal "
-                    "force, which ends where the master is left: let that reach further there"
+                    f"; {nodes} on {pair.master_surface.name!r} from beyond its end with {share:.1%} of the "
+                    "normal force, which ends where the master is left: let that reach further there"
                 )
     return "".join(found)
 
@@ -558,7 +555,7 @@ def _on_contact(scene: Scene) -> str:
     """
 
     def by_nodes(pair: ContactPair) -> bool:
-        return isinstance(pair.master, Surface) and not pair.by_mortar and not pair.is_self_contact
+        return pair.between_bodies and not pair.by_mortar and not pair.is_self_contact
 
     if not any(map(by_nodes, scene.contacts)):
         return ""
@@ -572,9 +569,8 @@ def _on_symmetry(scene: Scene) -> str:
     """
     acting = [*scene.supports, *(load for load in scene.loads if hasattr(load, "surface"))]
     used = {(each.body, each.surface) for each in acting}
-    sides = [side for pair in scene.contacts for side in (pair.slave, pair.master)]
-    sides += [side for tie in scene.ties for side in (tie.slave, tie.master)]
-    used |= {(side.body, side.name) for side in sides if isinstance(side, Surface)}
+    sides = [side for pair in (*scene.contacts, *scene.ties) for side in pair.surfaces]
+    used |= {(side.body, side.name) for side in sides}
     found = []
     for name, body in scene.bodies.items():
         mesh = body.mesh

@@ -17,10 +17,9 @@ from fenics_contact._large_deformations.loading import Loading, UnsymmetricLowRa
 from fenics_contact._pairing.inside import InFacets
 from fenics_contact._pairing.sliding.slip import MaterialPoints
 from fenics_contact._scene.local_axes import LocalAxes, free_matrix
-from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane, RigidTool
-from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.obstacles import RigidPlane
+from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import share_areas
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_mean_at
@@ -545,9 +544,7 @@ class MovingContact(Contact):
             scene, decomposition.fixed, decomposition.comm, axes=decomposition.axes
         )
         self._places = scene.points
-        surfaces = [
-            side for pair in scene.contacts for side in (pair.slave, pair.master) if isinstance(side, Surface)
-        ]
+        surfaces = [side for pair in scene.contacts for side in pair.surfaces]
         for side in surfaces:
             hanging = scene.bodies[side.body].mesh.hanging
             if np.isin(hanging.nodes, scene.facets(side)).any():
@@ -556,16 +553,15 @@ class MovingContact(Contact):
                     f"{side.name!r} of body {side.body!r} has some: refine all cells at that surface"
                 )
         numbers = [decomposition.tearing.global_nodes(s.body, np.unique(scene.facets(s))) for s in surfaces]
-        tools = [name for name, body in scene.bodies.items() if isinstance(body, ToolBody)]
         numbers += [
-            decomposition.tearing.global_nodes(name, np.arange(scene.bodies[name].mesh.n_nodes))
-            for name in tools
+            decomposition.tearing.global_nodes(name, np.arange(body.mesh.n_nodes))
+            for name, body in scene.tools.items()
         ]
         self._nodes = np.unique(np.concatenate(numbers))
         # No node passes through a half space: it is known everywhere on which side of a plane a node lies.
-        searched = [pair for pair in scene.contacts if not isinstance(_shape(pair.master), RigidPlane)]
-        sides = [side for pair in searched for side in (pair.slave, pair.master) if isinstance(side, Surface)]
-        self._obstacles = [pair.master for pair in searched if isinstance(pair.master, MovingObstacle)]
+        searched = [pair for pair in scene.contacts if not _on_plane(scene, pair)]
+        sides = [side for pair in searched for side in pair.surfaces]
+        self._obstacles = [obstacle for pair in searched for obstacle in pair.moving]
         self._facet = min((_facet_size(scene, side) for side in sides), default=np.inf)
 
     def put_inside(self, places: InFacets) -> None:
@@ -628,11 +624,10 @@ class MovingContact(Contact):
         return np.asarray(self._places + axes.to_global(local))
 
 
-def _shape(master: Surface | RigidObstacle) -> Surface | RigidObstacle:
-    """Return the obstacle that moves, where one does, else the master itself."""
-    if isinstance(master, RigidTool):
-        return master.shape
-    return master.obstacle if isinstance(master, MovingObstacle) else master
+def _on_plane(scene: Scene, pair: ContactPair) -> bool:
+    """Return whether the master of a pair is a plane, or a tool with one."""
+    shape = scene.tools[pair.tool].tool.shape if pair.tool else pair.obstacle_at_rest
+    return isinstance(shape, RigidPlane)
 
 
 def _facet_size(scene: Scene, side: Surface) -> float:

@@ -26,7 +26,6 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import RigidSurface
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.free_motions import FreeMotions
@@ -72,9 +71,7 @@ class TurnedSurface:
                 continue
             own = body.mesh.nodes_to_hold(support.surface)
             nodes = decomposition.tearing.global_nodes(support.body, own)
-            springs = np.zeros(len(support.motion))
-            if isinstance(body, ToolBody) and body.springs:
-                springs = np.array(body.springs)
+            springs = np.array(body.springs or np.zeros(len(support.motion)))
             points, far, whole = body.mesh.points[own], body.deforms_much, len(own) == body.mesh.n_nodes
             found.append(cls(support, support.prescribed, support.load, springs, nodes, points, far, whole))
         return tuple(found)

@@ -25,11 +25,10 @@ from fenics_contact._pairing.points import (
 )
 from fenics_contact._pairing.projection import shared_projection
 from fenics_contact._scene.local_axes import LocalAxes
-from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import node_weights, project
@@ -284,14 +283,13 @@ class ToolMaster(MovingMaster):
     @classmethod
     def serves(cls, pair: ContactPair | AnyTie) -> bool:
         """Tools."""
-        return isinstance(pair.master, RigidTool)
+        return bool(pair.tool)
 
     @classmethod
     def of(cls, scene: Scene, pair: Any, surface: SurfaceOf) -> ToolMaster:
         """Return the tool of a pair."""
         tool, numbers = pair.master, NodeNumbers.of(scene)
-        body = scene.bodies[tool.name]
-        assert isinstance(body, ToolBody)
+        body = scene.tools[tool.name]
         nodes = numbers.global_nodes(tool.name, np.arange(body.mesh.n_nodes))
         return cls(pair, numbers.n_nodes, tool, body, nodes)
 
@@ -334,7 +332,7 @@ class BodyMaster(Master):
     @classmethod
     def serves(cls, pair: ContactPair | AnyTie) -> bool:
         """Surfaces of bodies."""
-        return isinstance(pair.master, Surface)
+        return pair.between_bodies
 
     @classmethod
     def of(cls, scene: Scene, pair: Any, surface: SurfaceOf) -> Self:
@@ -488,7 +486,7 @@ class SectorMaster(TiedMaster):
     @classmethod
     def serves(cls, pair: ContactPair | AnyTie) -> bool:
         """Sides of sectors."""
-        return isinstance(pair, CyclicSymmetry)
+        return bool(pair.sectors)
 
     @classmethod
     def of(cls, scene: Scene, pair: Any, surface: SurfaceOf) -> SectorMaster:

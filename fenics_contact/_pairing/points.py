@@ -15,7 +15,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, free_part
-from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tresca
+from fenics_contact._scene.pairs import ContactPair, Coulomb, Tresca
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import together
@@ -604,8 +604,8 @@ def are_beside(scene: Scene, pair: ContactPair, other: ContactPair) -> bool:
     """Return whether the slave surface of another pair has no facet of the surfaces of a pair."""
     mesh = scene.bodies[other.slave.body].mesh
     theirs = corners_of(mesh.surfaces[other.slave.name], mesh.dim)
-    for side in (pair.slave, pair.master):
-        if isinstance(side, Surface) and side.body == other.slave.body:
+    for side in pair.surfaces:
+        if side.body == other.slave.body:
             mine = corners_of(mesh.surfaces[side.name], mesh.dim)
             if (match_faces(theirs, mine) >= 0).any():
                 return False

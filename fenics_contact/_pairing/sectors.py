@@ -66,7 +66,7 @@ def check_held_alike(
 
     `slight`: part of a direction in which the master may be free: normals of curved rollers have errors.
     """
-    cyclic = np.array([isinstance(tie, CyclicSymmetry) for tie in scene.ties])
+    cyclic = np.array([bool(tie.sectors) for tie in scene.ties])
     tied = ties.part(cyclic[ties.pair])
     which = np.flatnonzero(fixed[tied.slave].any(axis=1))
     if len(which) == 0:
@@ -99,7 +99,7 @@ def around_once(
 
     Returns the numbers of the points, shape (k,), and the weights of all points in each, shape (k, n).
     """
-    cyclic = np.array([isinstance(tie, CyclicSymmetry) for tie in scene.ties])
+    cyclic = np.array([bool(tie.sectors) for tie in scene.ties])
     tied = ties.part(cyclic[ties.pair])
     n_nodes = points.master.shape[1]
     number = np.full(n_nodes, -1)

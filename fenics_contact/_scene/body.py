@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from inspect import signature
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
+import scipy.sparse as sp
 
-from fenics_contact._base.checks import brief, checked
+from fenics_contact._base.checks import GivenVector, brief, checked
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._kinematics.element import Element
@@ -26,6 +27,9 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.mesh.collapsed import has_collapsed
 from fenics_contact.mesh.faces import computed_rounding
+
+#: Returns motions of points, (n, dim) -> (n, dim, n_modes).
+Modes: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 
 @displayed
@@ -58,6 +62,7 @@ class Body:
     """
 
     effect = EffectName.ELASTICITY
+    #: Whether it moves as one piece.
     is_rigid = False
     mesh: BodyMesh
     material: Material | Mapping[str, Material]
@@ -131,6 +136,19 @@ class Body:
     def rigid_modes(self, at: np.ndarray | None = None) -> np.ndarray:
         """Return its rigid motions at its nodes or elsewhere, see `rigid_body_modes`."""
         return self.kinematics.rigid_modes(self.mesh.points, at)
+
+    @property
+    def springs(self) -> GivenVector:
+        """Stiffness of springs that hold it as one piece, along and around the axes; none of elastic ones."""
+        return ()
+
+    def sprung(self, matrix: sp.csr_matrix, points: np.ndarray) -> sp.csr_matrix:
+        """Return a stiffness matrix of its nodes at points with that of its springs."""
+        return matrix
+
+    def kernel(self, points: np.ndarray, elastic: Modes) -> np.ndarray:
+        """Return its motions without energy at points, (n, dim, n_modes): those of its materials."""
+        return elastic(points)
 
     @property
     def volume(self) -> float:

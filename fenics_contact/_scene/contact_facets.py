@@ -11,9 +11,8 @@ from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.pairs import PairPart, Surface
 from fenics_contact._scene.parts import SceneParts
-from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.serendipity_cells import completed
 
@@ -21,10 +20,9 @@ _FREED: WeakKeyDictionary[BodyMesh, dict[tuple[str, ...], BodyMesh]] = WeakKeyDi
 """Meshes with centres as unknowns: scenes made of the same bodies have the same meshes."""
 
 
-def _pressed(pair: ContactPair | AnyTie) -> tuple[object, ...]:
+def _pressed(pair: PairPart) -> tuple[Surface, ...]:
     """Return the sides of a pair on which pressures act: none on a slave of which single nodes touch."""
-    alone = isinstance(pair, ContactPair) and pair.nodes is not None
-    return (pair.master,) if alone else (pair.slave, pair.master)
+    return pair.surfaces[1:] if pair.single_nodes else pair.surfaces
 
 
 def with_free_centres(scene: SceneParts) -> Mapping[str, Body]:
@@ -34,9 +32,7 @@ def with_free_centres(scene: SceneParts) -> Mapping[str, Body]:
         if not body.mesh.centres:
             continue
         sides = (side for pair in (*scene.contacts, *scene.ties) for side in _pressed(pair))
-        touching = tuple(
-            sorted({side.name for side in sides if isinstance(side, Surface) and side.body == name})
-        )
+        touching = tuple(sorted({side.name for side in sides if side.body == name}))
         if touching:
             known = _FREED.setdefault(body.mesh, {})
             if touching not in known:

@@ -19,8 +19,7 @@ from fenics_contact.mesh.faces import computed_rounding
 
 def with_corner_as_slave(scene: SceneParts, pair: ContactPair) -> ContactPair:
     """Return a pair of two bodies, exchanged if its master alone touches first with a corner, and is free."""
-    slave, master = pair.slave, pair.master
-    assert isinstance(master, Surface)
+    slave, master = pair.slave, pair.master_surface
     if not _touches_with_a_corner(scene, master, slave) or is_held(scene, master):
         return pair
     return pair if _touches_with_a_corner(scene, slave, master) else exchanged(pair)
@@ -28,8 +27,7 @@ def with_corner_as_slave(scene: SceneParts, pair: ContactPair) -> ContactPair:
 
 def exchanged(pair: ContactPair) -> ContactPair:
     """Return a pair of two bodies with the other slave."""
-    assert isinstance(pair.master, Surface)
-    return replace(pair, slave=pair.master, master=pair.slave)
+    return replace(pair, slave=pair.master_surface, master=pair.slave)
 
 
 def is_held(scene: SceneParts, side: Surface) -> bool:

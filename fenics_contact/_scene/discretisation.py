@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._scene.choice import Choice
 from fenics_contact._scene.corners import with_corner_as_slave
-from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface
+from fenics_contact._scene.pairs import ContactPair, Discretisation
 from fenics_contact._scene.parts import SceneParts
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
@@ -54,9 +54,7 @@ def keeping_discretisation(scene: AnyScene) -> AnyScene:
 
 def in_words(pair: ContactPair | AnyTie) -> str:
     """Return the discretisation of a pair and, where the scene chose it, why."""
-    if not isinstance(pair.master, Surface):
-        return f"node, {RIGID}"
-    return pair.explained_discretisation
+    return pair.explained_discretisation if pair.between_bodies else f"node, {RIGID}"
 
 
 def _with_choice(scene: SceneParts, pair: Pair) -> Pair:
@@ -71,7 +69,7 @@ def _with_choice(scene: SceneParts, pair: Pair) -> Pair:
 
 def _with_better_slave(scene: SceneParts, pair: Pair) -> Pair:
     """Return a pair, exchanged where its master touches first with a corner, if it may be."""
-    if not isinstance(pair, ContactPair) or not isinstance(pair.master, Surface):
+    if not isinstance(pair, ContactPair) or not pair.between_bodies:
         return pair
     if pair.is_self_contact or pair.depends_on_slave:
         return pair
@@ -92,18 +90,17 @@ def _kept(pair: Pair) -> Pair:
 
 def _choice(scene: SceneParts, pair: ContactPair | AnyTie) -> tuple[Discretisation, str]:
     """Return the better discretisation of a pair, and why."""
-    if not isinstance(pair.master, Surface):
+    if not pair.between_bodies:
         return "node", RIGID
-    if isinstance(pair, ContactPair) and pair.is_self_contact:
+    if pair.is_self_contact:
         return "node", "as the body meets itself"
-    if isinstance(pair, ContactPair) and pair.nodes is not None:
-        return "node", f"as the nodes of {pair.nodes!r} touch"
-    sides = pair.slave, pair.master
-    slave, master = (scene.bodies[side.body].mesh.origin for side in sides)
+    if pair.single_nodes:
+        return "node", f"as the nodes of {pair.single_nodes!r} touch"
+    slave, master = (scene.bodies[side.body].mesh.origin for side in pair.surfaces)
     known = _KNOWN.setdefault(slave, WeakKeyDictionary()).setdefault(master, {})
-    names = pair.slave.name, pair.master.name
-    if isinstance(pair, CyclicSymmetry):
-        match = _sides_match(scene, pair, slave, master)
+    names = pair.slave.name, pair.master_surface.name
+    for sector in pair.sectors:
+        match = _sides_match(scene, sector, slave, master)
         return ("node", "as the meshes match") if match else ("mortar", "as the meshes do not match")
     if names not in known:
         known[names] = _chosen_by_meshes(slave, master, names)

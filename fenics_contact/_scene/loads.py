@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -33,9 +34,25 @@ from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
 
 
+class LoadPart(Part):
+    """What all loads answer.
+
+    Attributes:
+        body: Name of the body.
+        value: What it is, numbers, a function of points or `Ufl`.
+    """
+
+    body: str
+    value: Any
+
+    def following(self, scene: Around) -> tuple[Pressure, ...]:
+        """Return the load if it follows its surface."""
+        return ()
+
+
 @dataclass(frozen=True)
 @checked("value")
-class Traction(Part):
+class Traction(LoadPart):
     """Dead surface load.
 
     Attributes:
@@ -68,7 +85,7 @@ class Traction(Part):
 
 @dataclass(frozen=True)
 @checked("value")
-class TotalForce(Part):
+class TotalForce(LoadPart):
     """Dead surface load given by its resultant, spread over the surface of the undeformed body.
 
     Without ``moment`` and ``at`` it is an even traction. With them the traction is a + b × (x − c), c being
@@ -155,7 +172,7 @@ def _numbers(name: str, given: GivenVector | float) -> GivenVector | float:
 
 @dataclass(frozen=True)
 @checked("value")
-class Pressure(Part):
+class Pressure(LoadPart):
     """Load normal to a surface; positive presses on the body, traction = −p n.
 
     On a body of a material for large deformations it follows the surface, f = −p cof F N per undeformed area:
@@ -199,7 +216,7 @@ class Pressure(Part):
 
 @dataclass(frozen=True)
 @checked("value")
-class BodyForce(Part):
+class BodyForce(LoadPart):
     """Dead load on the volume; for weight see `gravity`.
 
     Attributes:
@@ -235,7 +252,7 @@ class BodyForce(Part):
 
 @dataclass(frozen=True)
 @checked("temperature_change")
-class ThermalStrain(Part):
+class ThermalStrain(LoadPart):
     """A temperature change that would strain the body if it were free: σ = C : (ε(u) − ΔT α).
 
     Its work is ∫ ΔT (C : α) : ε(v). Several on one body add up. The energy of a state counts it as the work
@@ -276,7 +293,7 @@ class ThermalStrain(Part):
 
 @dataclass(frozen=True)
 @checked("value")
-class InitialStress(Part):
+class InitialStress(LoadPart):
     """A stress that a body has before anything loads or moves it: of welding, rolling, an earlier process.
 
     The body relaxes it as far as its supports let it: σ = σ₀ + C : ε(u), and the work of σ₀ is
@@ -358,7 +375,7 @@ class InitialStress(Part):
 
 @dataclass(frozen=True)
 @checked("value")
-class PointForce(Part):
+class PointForce(LoadPart):
     """Dead forces at single nodes.
 
     Under a force at a point an elastic body has no finite displacement or stress: both grow as its mesh is

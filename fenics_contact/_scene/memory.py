@@ -12,7 +12,6 @@ import scipy.sparse as sp
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.memory import addressable_memory, available_memory
 from fenics_contact._base.sparse import factor_bytes, prefers_explicit
-from fenics_contact._scene.pairs import Surface
 from fenics_contact.errors import InvalidInputError, together
 
 if TYPE_CHECKING:
@@ -299,8 +298,8 @@ def _counted(
     marks = scene.fixed(name).astype(float)
     for pair in (*scene.contacts, *scene.ties):
         # The master has rows at fewer nodes than the slave, and seldom the same pieces.
-        for surface, mark in ((pair.slave, 1.0), (pair.master, 1.5)):
-            if isinstance(surface, Surface) and surface.body == name:
+        for surface, mark in zip(pair.surfaces, (1.0, 1.5), strict=False):
+            if surface.body == name:
                 marks[np.unique(scene.facets(surface))] = mark
     marks[np.bincount(node, minlength=mesh.n_nodes) > 1] = 1.0
     on_interface = marks[node].sum(axis=1)

@@ -111,8 +111,8 @@ def modulus_of(scene: SceneParts, pair: ContactPair) -> float | None:
     Rigid obstacles count as infinitely stiff.
     """
     sides = [_constants(scene.bodies[pair.slave.body]), (np.inf, 0.0)]
-    if isinstance(pair.master, Surface):
-        sides[1] = _constants(scene.bodies[pair.master.body])
+    for master in pair.surfaces[1:]:
+        sides[1] = _constants(scene.bodies[master.body])
     if None in sides:
         return None
     (young_1, poisson_1), (young_2, poisson_2) = sides  # type: ignore[misc]
@@ -121,8 +121,7 @@ def modulus_of(scene: SceneParts, pair: ContactPair) -> float | None:
 
 def master_share(scene: SceneParts, pair: ContactPair | AnyTie) -> float:
     """Return the master's share of the compliance 1/E* of two bodies; a half where one is not isotropic."""
-    assert isinstance(pair.master, Surface)
-    own, other = (_constants(scene.bodies[surface.body]) for surface in (pair.slave, pair.master))
+    own, other = (_constants(scene.bodies[surface.body]) for surface in pair.surfaces)
     if own is None or other is None:
         return 0.5
     moduli = [contact_modulus(*constants, np.inf, 0.0) for constants in (own, other)]
@@ -336,11 +335,11 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     geometry = "best" if pair.geometry == "faceted" else pair.geometry
     slave = surface_of(scene, pair.slave, geometry if pair.nodes is None else "faceted")
     name = _name(scene, pair, pair.slave, slave)
-    if not isinstance(pair.master, Surface):
-        met = _meeting_obstacle(slave, pair.master)
+    if not pair.between_bodies:
+        met = _meeting_obstacle(slave, pair.obstacle)
         approach = _approach(scene, pair, slave, met)
-        return PairGeometry(name, _shape_name(pair.master), 0.0, approach, in_words(pair), pair.given_gap)
-    master = surface_of(scene, pair.master, geometry)
+        return PairGeometry(name, _shape_name(pair.obstacle), 0.0, approach, in_words(pair), pair.given_gap)
+    master = surface_of(scene, pair.master_surface, geometry)
     met = _meeting(slave, master)
     approach = _approach(scene, pair, slave, met)
     near = met.gap <= met.gap.min(initial=np.inf) + (np.inf if approach is None else approach)
@@ -350,7 +349,7 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
         height = max(height, _largest_height(slave, touching))
     if pair.gives_all_gaps:
         height = 0.0
-    names = name, _name(scene, pair, pair.master, master)
+    names = name, _name(scene, pair, pair.master_surface, master)
     wider, by_nodes = _wider(slave, master, met), not pair.by_mortar
     onto_linear = slave.order > master.order
     geometry_of = PairGeometry(*names, height, approach, in_words(pair), pair.given_gap, wider, by_nodes)
@@ -451,7 +450,7 @@ class Unpaired:
 
     def is_of(self, pair: ContactPair) -> bool:
         """Return whether they are the bodies of a pair."""
-        return isinstance(pair.master, Surface) and {pair.slave.body, pair.master.body} == set(self.bodies)
+        return set(pair.bodies) == set(self.bodies)
 
     def in_words(self, entering: str = "pass into each other") -> str:
         """Return what is wrong and what to do, or "" if nothing is."""
@@ -504,7 +503,7 @@ def bodies_near(scene: SceneParts, reach: float) -> list[tuple[str, str]]:
     boxes = {
         name: (body.mesh.points.min(axis=0) - reach, body.mesh.points.max(axis=0) + reach)
         for name, body in scene.bodies.items()
-        if not isinstance(body, ToolBody)
+        if not body.is_rigid
     }
     slack = TOUCHING * max(float(np.max(high - low)) for low, high in boxes.values())
 
@@ -569,9 +568,8 @@ def _named(scene: SceneParts, both: tuple[str, str]) -> dict[str, np.ndarray]:
     nodes: dict[str, list[np.ndarray]] = {name: [] for name in both}
     pairs: list[ContactPair | AnyTie] = [*scene.contacts, *scene.ties]
     for pair in pairs:
-        sides = [side for side in (pair.slave, pair.master) if isinstance(side, Surface)]
-        if {side.body for side in sides} == set(both):
-            for side in sides:
+        if set(pair.bodies) == set(both):
+            for side in pair.surfaces:
                 nodes[side.body].append(np.unique(scene.bodies[side.body].mesh.surfaces[side.name]))
     for constraint in scene.constraints:
         terms = [term for term in constraint.terms if term.body in both]

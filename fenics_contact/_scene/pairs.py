@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.fluid import FluidPressure
-from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
+from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidTool
 from fenics_contact._scene.part import Around, Part, require_surface
 from fenics_contact._scene.surface_laws import (
     ClosureLaw,
@@ -27,6 +27,9 @@ from fenics_contact._scene.surface_laws import (
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import is_nonlinear
+
+if TYPE_CHECKING:
+    from fenics_contact._scene.sectors import CyclicSymmetry
 
 #: Where contact is enforced: at the slave's nodes, or weighted by its shape functions (mortar).
 Discretisation: TypeAlias = Literal["node", "mortar"]
@@ -134,10 +137,105 @@ class Tresca:
 Friction: TypeAlias = Coulomb | Tresca | None
 
 
+class PairPart(Chosen, Part):
+    """Two sides that touch or stay together: what contact pairs, ties and sides of sectors answer alike.
+
+    Attributes:
+        sliding: Whether surfaces that stay together may slide along each other.
+    """
+
+    slave: Surface
+    master: Any
+    sliding = False
+
+    @property
+    def geometry(self) -> Geometry:
+        """Facets, as the gap between surfaces that stay together is not used."""
+        return "faceted"
+
+    @property
+    def given_gap(self) -> str:
+        """What the pair gives in place of measured gaps, in words; empty if nothing."""
+        return ""
+
+    @property
+    def single_nodes(self) -> str:
+        """Name of the node set of the slave's body whose nodes alone may touch; empty if all may."""
+        return ""
+
+    @property
+    def is_self_contact(self) -> bool:
+        """Whether a body meets itself, which needs large deformations."""
+        return False
+
+    @property
+    def sectors(self) -> tuple[CyclicSymmetry, ...]:
+        """The pair, if it has the sides of a sector."""
+        return ()
+
+    @property
+    def tool(self) -> str:
+        """Name of the rigid tool that is its master, empty if none is."""
+        return ""
+
+    @property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """Its sides that are surfaces of bodies, the slave first: all but obstacles."""
+        return self.slave, self.master
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies that it acts on, that of the slave first; a tool is one."""
+        return tuple(side.body for side in self.surfaces)
+
+    @property
+    def between_bodies(self) -> bool:
+        """Whether the master is a surface of a body, and no obstacle."""
+        return len(self.surfaces) == 2
+
+    @property
+    def master_surface(self) -> Surface:
+        """The master of a pair between bodies."""
+        _, master = self.surfaces
+        return master
+
+    @property
+    def obstacle(self) -> RigidObstacle:
+        """The master of a pair with an obstacle."""
+        return cast("RigidObstacle", self.master)
+
+    @property
+    def slave_geometry(self) -> Geometry:
+        """The geometry of the slave: facets where single nodes touch, which may go around corners."""
+        return "faceted" if self.single_nodes else self.geometry
+
+    @property
+    def by_mortar(self) -> bool:
+        """Whether weighted means are compared: contact with a rigid obstacle is always nodal."""
+        return self.between_bodies and self.discretisation == "mortar"
+
+    @property
+    def place(self) -> str:
+        """Its surfaces: "upper z0 on lower z1", "block z0 on rigid plane"."""
+        return f"{self.slave.in_words} on {self.master_in_words}"
+
+    @property
+    def master_in_words(self) -> str:
+        """The surface or the obstacle that is the master: "lower z1", "rigid plane"."""
+        return self.master_surface.in_words
+
+    def _facts(self) -> dict[str, Any]:
+        """Return what is given of it, and its discretisation with the reason of the scene's choice."""
+        known = fields(self)  # type: ignore[arg-type]
+        given = {each.name: getattr(self, each.name) for each in known if each.repr}
+        given["discretisation"] = self.explained_discretisation
+        return {name: value for name, value in given.items() if value is not None and value is not False}
+
+
 @in_notebooks
 @dataclass(frozen=True)
 @checked()
-class ContactPair(Chosen, Part):
+class ContactPair(PairPart):
     """Two surfaces that may touch. The slave may not penetrate the master.
 
     Attributes:
@@ -247,10 +345,10 @@ class ContactPair(Chosen, Part):
                 f"the SlipTable of {self.place} needs linear materials in all bodies: give the coefficient "
                 "of each load step as a number or a function of the place"
             )
-        if isinstance(self.master, Surface):
-            require_surface(scene, self.master.body, self.master.name, "ContactPair.master")
-        else:
-            _require_dimension(scene, self.master)
+        for master in self.surfaces[1:]:
+            require_surface(scene, master.body, master.name, "ContactPair.master")
+        if not self.between_bodies:
+            _require_dimension(scene, self.obstacle)
 
     def _require_deforming(self, scene: Around) -> None:
         """Reject contact of a body with itself unless it may deform much."""
@@ -279,28 +377,45 @@ class ContactPair(Chosen, Part):
             )
 
     @property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """Its sides that are surfaces of bodies, the slave first: all but obstacles."""
+        return (self.slave, self.master) if isinstance(self.master, Surface) else (self.slave,)
+
+    @property
+    def moving(self) -> tuple[MovingObstacle, ...]:
+        """The obstacle that is its master, if that moves as prescribed."""
+        return (self.master,) if isinstance(self.master, MovingObstacle) else ()
+
+    @property
+    def obstacle_at_rest(self) -> RigidObstacle:
+        """The obstacle before it moves as prescribed."""
+        return next((each.obstacle for each in self.moving), self.obstacle)
+
+    @property
+    def single_nodes(self) -> str:
+        """Name of the node set of the slave's body whose nodes alone may touch; empty if all may."""
+        return self.nodes or ""
+
+    @property
+    def tool(self) -> str:
+        """Name of the rigid tool that is its master, empty if none is."""
+        return self.master.name if isinstance(self.master, RigidTool) else ""
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies that it acts on, that of the slave first; a tool is one."""
+        return (*super().bodies, self.tool) if self.tool else super().bodies
+
+    @property
     def is_self_contact(self) -> bool:
         """Whether a body meets itself, which needs large deformations."""
-        return isinstance(self.master, Surface) and self.master.body == self.slave.body
+        return any(master.body == self.slave.body for master in self.surfaces[1:])
 
     @property
     def within_body(self) -> bool:
         """The old name of `is_self_contact`, until 0.4."""
         warn_of_old_name("ContactPair.within_body", "is_self_contact")
         return self.is_self_contact
-
-    @property
-    def slave_geometry(self) -> Geometry:
-        """The geometry of the slave: facets where single nodes touch, which may go around corners."""
-        return self.geometry if self.nodes is None else "faceted"
-
-    @property
-    def by_mortar(self) -> bool:
-        """Whether weighted means are compared: contact with a rigid obstacle is always nodal."""
-        return isinstance(self.master, Surface) and self.discretisation == "mortar"
-
-    def _facts(self) -> dict[str, Any]:
-        return facts_of_pair(self)
 
     @property
     def depends_on_slave(self) -> bool:
@@ -310,9 +425,11 @@ class ContactPair(Chosen, Part):
         return varies or not measured or self.nodes is not None or self.fluid is not None
 
     @property
-    def place(self) -> str:
-        """Its surfaces: "upper z0 on lower z1", "block z0 on rigid plane"."""
-        return place_of(self.slave, self.master)
+    def master_in_words(self) -> str:
+        """The surface or the obstacle that is the master: "lower z1", "rigid plane"."""
+        if self.between_bodies:
+            return super().master_in_words
+        return self.tool or name_in_words(type(self.master).__name__)
 
     @property
     def given_gap(self) -> str:
@@ -410,7 +527,7 @@ class ContactPair(Chosen, Part):
 @in_notebooks
 @dataclass(frozen=True)
 @checked()
-class Tie(Chosen, Part):
+class Tie(PairPart):
     """Two surfaces that stay together: they neither separate nor, unless ``sliding``, shift.
 
     An initial gap between their meshes stays as it is.
@@ -443,19 +560,6 @@ class Tie(Chosen, Part):
         """Reject surfaces that are not there."""
         require_surface(scene, self.slave.body, self.slave.name, "Tie.slave")
         require_surface(scene, self.master.body, self.master.name, "Tie.master")
-
-    @property
-    def geometry(self) -> Geometry:
-        """Facets, as the gap between tied surfaces is not used."""
-        return "faceted"
-
-    def _facts(self) -> dict[str, Any]:
-        return facts_of_pair(self)
-
-    @property
-    def place(self) -> str:
-        """Its surfaces: "upper z0 on lower z1"."""
-        return place_of(self.slave, self.master)
 
 
 @tabled
@@ -522,21 +626,6 @@ def _in_words(value: float | OfPosition | str) -> str:
     if callable(value):
         return "by a function"
     return value if isinstance(value, str) else f"{value:g}"
-
-
-def facts_of_pair(pair: ContactPair | Tie) -> dict[str, Any]:
-    """Return what is given of a pair, and its discretisation with the reason of the scene's choice."""
-    given = {each.name: getattr(pair, each.name) for each in fields(pair) if each.repr}
-    given["discretisation"] = pair.explained_discretisation
-    return {name: value for name, value in given.items() if value is not None and value is not False}
-
-
-def place_of(slave: Surface, master: Surface | RigidObstacle) -> str:
-    """Return the surfaces of a pair in words."""
-    if isinstance(master, Surface):
-        return f"{slave.in_words} on {master.in_words}"
-    name = master.name if isinstance(master, RigidTool) else name_in_words(type(master).__name__)
-    return f"{slave.in_words} on {name}"
 
 
 def named(which: str, surfaces: Sequence[str], places: Sequence[str]) -> list[int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -32,7 +33,7 @@ from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support, ToolMotion
 from fenics_contact._scene.thickness import require_thickness
-from fenics_contact._scene.tools import ToolBody, bodies_with_tools, with_motions
+from fenics_contact._scene.tools import ToolBody, bodies_with_tools, tools_in, with_motions
 from fenics_contact._surfaces.corners import facing_area, sharp_nodes
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.true_surface import Geometry, true_surface
@@ -111,16 +112,17 @@ class SceneParts:
     @property
     def deforming(self) -> dict[str, Body]:
         """The bodies without those that carry the motions of tools."""
-        return {name: body for name, body in self.bodies.items() if not isinstance(body, ToolBody)}
+        return {name: body for name, body in self.bodies.items() if not body.is_rigid}
 
     @property
     def following_pressures(self) -> tuple[Pressure, ...]:
         """The pressures that follow their surfaces, those on bodies that deform much."""
-        return tuple(
-            load
-            for load in self.loads
-            if isinstance(load, Pressure) and not load.dead and self.bodies[load.body].deforms_much
-        )
+        return tuple(chain.from_iterable(load.following(self) for load in self.loads))
+
+    @property
+    def tools(self) -> dict[str, ToolBody]:
+        """The bodies that carry the motions of tools."""
+        return tools_in(self.bodies)
 
     def _require_one_dimension(self) -> None:
         """Raise if some bodies are plane and others solid, or only some are bodies of revolution."""
@@ -211,13 +213,13 @@ class SceneParts:
         """Names of the bodies with rollers, or with a side of a sector, which may end at the axis."""
         rolling = {support.body for support in self.supports if isinstance(support, Roller)}
         for sector in self.sectors:
-            rolling |= {sector.slave.body, sector.master.body}
+            rolling |= {*sector.bodies}
         return tuple(name for name in self.bodies if name in rolling)
 
     @property
     def sectors(self) -> tuple[CyclicSymmetry, ...]:
         """The sides of sectors among its ties."""
-        return tuple(tie for tie in self.ties if isinstance(tie, CyclicSymmetry))
+        return tuple(chain.from_iterable(tie.sectors for tie in self.ties))
 
     def held_by_rollers(
         self, body: str, prescribed: np.ndarray, supports: Sequence[AnySupport] | None = None
@@ -239,7 +241,7 @@ class SceneParts:
         """Return what holds nodes on the axes of sectors: there both sides are one."""
         mesh, held = self.bodies[body].mesh, []
         for sector in self.sectors:
-            sides = {side.name for side in (sector.slave, sector.master) if side.body == body}
+            sides = {side.name for side in sector.surfaces if side.body == body}
             held += [sector.held_on_axis(mesh, name) for name in sorted(sides)]
         return held
 

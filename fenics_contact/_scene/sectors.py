@@ -10,13 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
+from fenics_contact._scene.choice import NO_CHOICE, Choice
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.local_axes import HeldDirections
-from fenics_contact._scene.pairs import AnyDiscretisation, Surface, Tie, place_of
-from fenics_contact._scene.part import Around, Part, require_surface
+from fenics_contact._scene.pairs import AnyDiscretisation, PairPart, Surface, Tie
+from fenics_contact._scene.part import Around, require_surface
 from fenics_contact._surfaces.facets import surface_moments
-from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.shapes.simple import tangent_bases
@@ -24,7 +23,7 @@ from fenics_contact.shapes.simple import tangent_bases
 
 @dataclass(frozen=True)
 @checked()
-class CyclicSymmetry(Chosen, Part):
+class CyclicSymmetry(PairPart):
     """Both sides of a sector that repeats around an axis: u_slave = R u_master, R turns master onto slave.
 
     One of the `Scene.ties`. The sector is 360°/N of a whole whose loads and supports repeat, too; all its
@@ -99,19 +98,9 @@ class CyclicSymmetry(Chosen, Part):
         return self.measured_angle(slave, master)
 
     @property
-    def sliding(self) -> bool:
-        """Whether the sides may slide along each other."""
-        return False
-
-    @property
-    def geometry(self) -> Geometry:
-        """Facets, as for ties."""
-        return "faceted"
-
-    @property
-    def place(self) -> str:
-        """Its surfaces: "rotor end on rotor start"."""
-        return place_of(self.slave, self.master)
+    def sectors(self) -> tuple[CyclicSymmetry, ...]:
+        """Itself."""
+        return (self,)
 
     def matrix(self, angle: float) -> np.ndarray:
         """Return the rotation about the axis by an angle, shape (dim, dim)."""

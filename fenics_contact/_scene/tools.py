@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact._base.checks import GivenVector, checked
 from fenics_contact._base.display import displayed
-from fenics_contact._scene.body import Body
+from fenics_contact._scene.body import Body, Modes
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair
@@ -56,8 +58,8 @@ class ToolBody(Body):
         """Return the displacement of points for unit motions of the tool, (n, dim) -> (n, dim, n_modes)."""
         return motions_about(points, np.array(self.tool.at))
 
-    def kernel(self, points: np.ndarray) -> np.ndarray:
-        """Return the motions that no spring resists, (n, dim) -> (n, dim, n_modes), turns by size of cell."""
+    def kernel(self, points: np.ndarray, elastic: Modes) -> np.ndarray:
+        """Return the motions that no spring resists, (n, dim, n_modes), turns by size of cell."""
         free = np.array(self.springs) == 0.0 if self.springs else np.ones(3 * self.tool.dim - 3, dtype=bool)
         if self.axisymmetric:  # other motions strain a body of revolution
             free &= [False, True, False]
@@ -71,6 +73,10 @@ class ToolBody(Body):
         units = np.repeat([1.0, arm], [dim, 2 * dim - 3])
         motion = np.linalg.pinv(self.modes(points).reshape(points.size, -1) / units)
         return np.asarray(motion.T @ np.diag(self.springs / units**2) @ motion)
+
+    def sprung(self, matrix: sp.csr_matrix, points: np.ndarray) -> sp.csr_matrix:
+        """Return a stiffness matrix of its nodes at points with that of its springs."""
+        return (matrix + sp.csr_matrix(self.spring_matrix(points))).tocsr() if self.springs else matrix
 
     def frame(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rotation R and translation c of the tool, R x + c, from places of its nodes, (n, dim)."""
@@ -97,13 +103,16 @@ class ToolBody(Body):
         return np.asarray(arms * self.tool.dim / np.einsum("jd,jd->", arms, arms))
 
 
+def tools_in(bodies: Mapping[str, Body]) -> dict[str, ToolBody]:
+    """Return the bodies that carry the motions of tools."""
+    return {name: body for name, body in bodies.items() if isinstance(body, ToolBody)}
+
+
 def tools_of(contacts: Sequence[ContactPair]) -> dict[str, tuple[RigidTool, str]]:
     """Return the tools of contact pairs by name, with the body of the first slave that each meets."""
     found: dict[str, tuple[RigidTool, str]] = {}
-    for pair in contacts:
-        tool = pair.master
-        if not isinstance(tool, RigidTool):
-            continue
+    for pair in (each for each in contacts if each.tool):
+        tool = cast("RigidTool", pair.master)
         known = found.setdefault(tool.name, (tool, pair.slave.body))[0]
         if known != tool:
             raise InvalidInputError(
@@ -116,7 +125,7 @@ def tools_of(contacts: Sequence[ContactPair]) -> dict[str, tuple[RigidTool, str]
 def bodies_with_tools(bodies: Mapping[str, Body], contacts: Sequence[ContactPair]) -> Mapping[str, Body]:
     """Return the bodies of a scene and those of its tools."""
     tools = tools_of(contacts)
-    before = {name: body for name, body in bodies.items() if isinstance(body, ToolBody)}
+    before = tools_in(bodies)
     if not tools and not before:
         return bodies
     own = {name: body for name, body in bodies.items() if name not in before}
@@ -148,13 +157,12 @@ def with_motions(
     bodies: Mapping[str, Body], supports: Sequence[AnySupport]
 ) -> tuple[Mapping[str, Body], tuple[AnySupport, ...]]:
     """Return the bodies with the springs of tools, and the supports with all motions of tools as surfaces."""
-    tools = {name: body for name, body in bodies.items() if isinstance(body, ToolBody)}
+    tools = tools_in(bodies)
     made: list[AnySupport] = []
     changed: dict[str, Body] = {}
     for support in supports:
         if not isinstance(support, ToolMotion):
-            if not isinstance(bodies.get(support.body), ToolBody) or support.body in tools:
-                made.append(support)
+            made.append(support)
             continue
         if support.tool not in tools:
             raise InvalidInputError(
@@ -182,7 +190,7 @@ def with_tool_parts(
     bodies: Mapping[str, Body], partitions: Mapping[str, np.ndarray]
 ) -> Mapping[str, np.ndarray]:
     """Return partitions of bodies with those of the cells of tools, which no one cuts."""
-    tools = [name for name, body in bodies.items() if isinstance(body, ToolBody) and name not in partitions]
+    tools = [name for name in tools_in(bodies) if name not in partitions]
     return {**partitions, **{name: np.zeros(1, dtype=np.int64) for name in tools}} if tools else partitions
 
 

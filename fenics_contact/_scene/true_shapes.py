@@ -15,14 +15,11 @@ def is_without_shape(scene: SceneParts, side: Surface, pair: ContactPair) -> boo
 
 def sides_without_shape(scene: SceneParts, pair: ContactPair) -> list[Surface]:
     """Return the surfaces of a pair that are curved, and whose true shape is unknown or not used."""
-    sides = [side for side in (pair.slave, pair.master) if isinstance(side, Surface)]
-    return [side for side in sides if is_without_shape(scene, side, pair)]
+    return [side for side in pair.surfaces if is_without_shape(scene, side, pair)]
 
 
 def is_approximate(scene: SceneParts, pair: ContactPair) -> bool:
     """Return whether gaps are measured between curved surfaces that are only known by their nodes."""
-    if not isinstance(pair.master, Surface):
-        return False
     # Slave nodes lie on their surface; mortar contact also uses what is between them.
-    sides = (pair.master, pair.slave) if pair.by_mortar else (pair.master,)
+    sides = pair.surfaces[::-1] if pair.by_mortar else pair.surfaces[1:]
     return any(is_without_shape(scene, side, pair) for side in sides)

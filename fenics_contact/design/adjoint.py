@@ -13,7 +13,6 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import Task
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.plan import MOTION_ROUNDING
 from fenics_contact._surfaces.facets import edge_distance
 from fenics_contact.design.objective import Partials
@@ -194,10 +193,9 @@ def _points_on_edges(state: State, edge_tolerance: float = 1e-6) -> int:
     points = state.torn.points
     total = 0
     for index, pair in enumerate(state.scene.contacts):
-        if isinstance(pair.master, Surface):
+        for master in pair.surfaces[1:]:
             closed = (points.pair == index) & (points.facet >= 0) & (state.contact.normal_force > 0)
-            mesh = state.scene.bodies[pair.master.body].mesh.linear
-            corners = mesh.surfaces[pair.master.name].shape[1]
+            corners = state.scene.facets(master).shape[1]
             distance = np.abs(edge_distance(points.local[closed], corners))
             total += int(np.count_nonzero(distance < edge_tolerance))
     return total

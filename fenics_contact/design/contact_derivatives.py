@@ -16,11 +16,9 @@ from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar.points import MortarPoints
 from fenics_contact._pairing.points import HELD, ContactPoints
 from fenics_contact._scene.fields import gradients_of
-from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
-from fenics_contact._scene.pairs import ContactPair, Surface, Tie, Tresca
+from fenics_contact._scene.pairs import ContactPair, PairPart, Tie, Tresca
 from fenics_contact._scene.parts import slave_of, surface_of
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection
 from fenics_contact.design.adjoint import LinearisedFace, slips_by_area
@@ -130,11 +128,11 @@ class PointMotions:
 
 
 def point_motions(
-    torn: TornSystem, points: ContactPoints, masters: Sequence[object], fields: PairedFields
+    torn: TornSystem, points: ContactPoints, pairs: Sequence[PairPart], fields: PairedFields
 ) -> PointMotions:
     """Return the motions of points. Collective."""
     tearing, scene = torn.decomposition.tearing, torn.scene
-    surfaces = [master for master in masters if isinstance(master, Surface)]
+    surfaces = [master for pair in pairs for master in pair.surfaces[1:]]
     opposite = [tearing.global_nodes(each.body, np.unique(scene.facets(each))) for each in surfaces]
     nodes = np.unique(np.concatenate([points.jump.indices, *opposite]))
     values = np.stack([nodal_mean_at(torn.decomposition, field, nodes) for field in fields.displacements])
@@ -161,11 +159,11 @@ def mortar_by_shape(
 ) -> np.ndarray:
     """Return the derivative by the nodes of all bodies, replicated, shape (n_nodes, dim). Collective."""
     tearing, scene = torn.decomposition.tearing, torn.scene
-    assert isinstance(pair.master, Surface)
-    slave, master = slave_of(scene, pair, pair.geometry), surface_of(scene, pair.master, pair.geometry)
+    faced = pair.master_surface
+    slave, master = slave_of(scene, pair, pair.geometry), surface_of(scene, faced, pair.geometry)
     nodes, opposite = (
         tearing.global_nodes(side.body, surface.nodes)
-        for side, surface in ((pair.slave, slave), (pair.master, master))
+        for side, surface in ((pair.slave, slave), (faced, master))
     )
     bearing, comm = np.isin(nodes, points), torn.decomposition.comm
     movable = ~scene.fixed(pair.slave.body)[slave.nodes].all(axis=1)
@@ -282,10 +280,10 @@ def contact_by_shape(
             result += _by_mortar(torn, index, rows, by_area)
             continue
         add_areas(result, torn, index, by_area)
-        if not isinstance(pair.master, Surface):
-            result[points.slave[mine]] += _by_obstacle(torn, pair.master, rows, mine)
-        else:
+        if pair.between_bodies:
             _add_projected(result, torn, pair, rows, mine)
+        else:
+            result[points.slave[mine]] += _by_obstacle(torn, pair, rows, mine)
     return result
 
 
@@ -323,18 +321,17 @@ def _by_mortar(torn: TornSystem, index: int, rows: RowFields, by_area: np.ndarra
     return mortar_by_shape(torn, torn.scene.contacts[index], slave, rows, given)
 
 
-def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:
+def _by_obstacle(torn: TornSystem, pair: ContactPair, rows: RowFields, mine: np.ndarray) -> np.ndarray:
     """Return the derivative by the slave nodes that face an obstacle, shape (n, dim)."""
     by, normal = _by_point(torn.points, rows, mine), torn.points.normal[mine]
     carried = np.zeros(normal.shape)
-    if isinstance(obstacle, RigidTool):  # a point farther from its reference point moves more
-        body = torn.scene.bodies[obstacle.name]
-        assert isinstance(body, ToolBody)
-        nodes = torn.decomposition.tearing.global_nodes(obstacle.name, np.arange(body.mesh.n_nodes))
+    if pair.tool:  # a point farther from its reference point moves more
+        body = torn.scene.tools[pair.tool]
+        nodes = torn.decomposition.tearing.global_nodes(pair.tool, np.arange(body.mesh.n_nodes))
         moved = np.broadcast_to(rows.at(nodes)[:, None], (2, len(mine), len(nodes), torn.components))
         carried = _by_point(torn.points, rows, mine, moved).weight @ body.weight_slopes
     with together(torn.decomposition.comm):
-        bending = evaluate_shape(obstacle, "curvatures", torn.scene.points[torn.points.slave[mine]])
+        bending = evaluate_shape(pair.obstacle, "curvatures", torn.scene.points[torn.points.slave[mine]])
     turning = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
     return np.asarray(carried + by.gap[:, None] * normal + np.einsum("nde,ne->nd", bending, turning))
 
@@ -343,8 +340,7 @@ def _add_projected(
     result: np.ndarray, torn: TornSystem, pair: ContactPair, rows: RowFields, mine: np.ndarray
 ) -> None:
     """Add the derivative by slave and master nodes of projected points."""
-    master = pair.master
-    assert isinstance(master, Surface)
+    master = pair.master_surface
     points, surface = torn.points, surface_of(torn.scene, master, pair.geometry)
     nodes = torn.decomposition.tearing.global_nodes(master.body, surface.nodes)
     carrying, gradients = carriers(surface, points.facet[mine], points.local[mine])
@@ -376,8 +372,7 @@ def _row_fields(torn: TornSystem, fields: PairedFields) -> RowFields:
     for k, x in enumerate(fields.multipliers):
         gathered = torn.numbering.gather(x, torn.tangential_rows.ravel())
         friction[k, torn.frictional] = gathered.reshape(-1, width)
-    masters = [pair.master for pair in torn.scene.contacts]
-    motions = point_motions(torn, points, masters, fields)
+    motions = point_motions(torn, points, torn.scene.contacts, fields)
     return RowFields(motions.nodes, motions.values, motions.relative, normal, friction)
 
 
@@ -409,13 +404,12 @@ def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
     ones by its normals, too.
     """
     result = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
-    masters = [tie.master for tie in torn.scene.ties]
     for rows in torn.tie_rows:
         points = rows.points
         if points.count == 0:
             continue
         _require_own_rows(torn, points)
-        motions = point_motions(torn, points, masters, fields)
+        motions = point_motions(torn, points, torn.scene.ties, fields)
         forces = np.stack([rows.along_rows(torn.gathered(x, rows)) for x in fields.multipliers])
         for index in np.unique(points.pair):
             tie, mine = torn.scene.ties[index], np.flatnonzero(points.pair == index)

@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.discretisation import keeping_discretisation
-from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import shape_functions
 from fenics_contact._surfaces.projection import project
@@ -58,9 +57,8 @@ def _with_given_gaps(scene: Scene) -> Mapping[str, set[str]]:
     """Return the bodies with surfaces in pairs that give their gaps: body -> names of these surfaces."""
     found: dict[str, set[str]] = {}
     for pair in scene.contacts:
-        for side in (pair.slave, pair.master):
-            if pair.given_gap and isinstance(side, Surface):
-                found.setdefault(side.body, set()).add(side.name)
+        for side in pair.surfaces if pair.given_gap else ():
+            found.setdefault(side.body, set()).add(side.name)
     return found
 
 

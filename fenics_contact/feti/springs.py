@@ -15,7 +15,6 @@ import scipy.sparse as sp
 
 from fenics_contact._pairing.following import means_on_masters
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
-from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.springs import Spring, mean_weights
 from fenics_contact.errors import together
@@ -85,12 +84,11 @@ def spring_points(springs: Sequence[Spring], scene: Scene, numbers: NodeNumbers)
     entries: list[tuple[np.ndarray, ...]] = []
     slaves = np.zeros(count, dtype=np.int64)
     for number, spring in enumerate(springs):
-        for end, sign in ((spring.first, 1.0), (spring.second, -1.0)):
-            if isinstance(end, Surface):
-                own, weights = mean_weights(scene, end)
-                nodes = numbers.global_nodes(end.body, own)
-                entries.append((sign * weights, np.full(len(nodes), number), nodes))
-                slaves[number] = nodes[0]
+        for end, sign in zip(spring.surfaces.values(), (1.0, -1.0), strict=False):
+            own, weights = mean_weights(scene, end)
+            nodes = numbers.global_nodes(end.body, own)
+            entries.append((sign * weights, np.full(len(nodes), number), nodes))
+            slaves[number] = nodes[0]
     entries.append((np.ones(count), np.arange(count), slaves))
     value, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
     master = sp.csr_matrix((value, (row, column)), shape=(count, n_nodes))

@@ -29,7 +29,6 @@ from fenics_contact._scene.loads import (
     ThermalStrain,
     initial_stress,
 )
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.following import AnyFollowing, Following
@@ -354,10 +353,9 @@ def assemble(
     beds = tuple(each for each in foundations if each.body == mesh.body)
     points = body.mesh.points[mesh.nodes]
     acting = tuple(load for load in loads if _acts(load, mesh, body))
-    springs = body.springs if isinstance(body, ToolBody) else ()
     if not _depends_on_shape_alone(body, parts, forms, beds):
         assembled = ALONE
-    now = parts, points, beds, springs
+    now = parts, points, beds, body.springs
     if earlier is not None and _same_stiffness(earlier, *now):
         assembled.add(earlier)
     else:
@@ -468,10 +466,8 @@ def _with_stiffness(
         _dolfinx.update_coordinates(space.mesh, by_input_node)
         indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(parts, element, space))
         elastic = mesh.matrix_of(sp.csr_matrix((data, indices, indptr)))
-        if isinstance(body, ToolBody) and body.springs:
-            return (elastic + sp.csr_matrix(body.spring_matrix(points))).tocsr()
         whole = (elastic + bed).tocsr() if bed.nnz else elastic
-        return mesh.following.stiffness(whole)
+        return mesh.following.stiffness(body.sprung(whole, points))
 
     bed = foundation_of(mesh, body, foundations)
     matrix = CachedMatrix(stiffness)
@@ -492,7 +488,7 @@ def _depends_on_shape_alone(
     body: Body, parts: Composition, forms: FormLibrary, beds: Sequence[ElasticFoundation]
 ) -> bool:
     """Return whether the stiffness depends on cells, numbering, materials and shape, but not on the place."""
-    special = bool(beds) or isinstance(body, ToolBody)
+    special = bool(beds) or body.is_rigid
     return body.kinematics.is_homogeneous and not (special or _varies(parts, body, forms))
 
 
@@ -517,9 +513,7 @@ def _from_own_origin(points: np.ndarray) -> np.ndarray:
 
 def kernel_of_body(body: Body, points: np.ndarray, materials: Sequence[Material]) -> np.ndarray:
     """Return the modes without energy of a body at points, (n, dim, n_modes)."""
-    if isinstance(body, ToolBody):
-        return body.kernel(points)
-    return common_kernel(materials, points, body.kinematics)
+    return body.kernel(points, lambda places: common_kernel(materials, places, body.kinematics))
 
 
 def common_kernel(materials: Sequence[Material], points: np.ndarray, kinematics: Kinematics) -> np.ndarray:

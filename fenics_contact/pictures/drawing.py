@@ -20,7 +20,6 @@ from scipy.spatial.transform import Rotation
 
 from fenics_contact._base.checks import GivenVector, floats, unit_vector
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidTool
-from fenics_contact._scene.pairs import Surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.pictures.canvas import (
     AXES,
@@ -81,8 +80,8 @@ def obstacles_of(state: State) -> list[SurfaceShape]:
     """Return the different rigid obstacles of a scene, where they are in a state of it."""
     obstacles: list[RigidObstacle] = []
     for pair in state.scene.contacts:
-        if not isinstance(pair.master, Surface) and pair.master not in obstacles:
-            obstacles.append(pair.master)
+        if not pair.between_bodies and pair.obstacle not in obstacles:
+            obstacles.append(pair.obstacle)
     return [simplified(_where_it_is(each, state)) for each in obstacles]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact._base.checks import GivenVector, naming_arguments, unit_vector
 from fenics_contact._scene.pair_geometry import modulus_of
-from fenics_contact._scene.pairs import Surface, pair_number
+from fenics_contact._scene.pairs import pair_number
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._surfaces.facets import filled_at_corners, nodal_areas
 from fenics_contact.materials.plastic import HistoryMaterial
@@ -228,17 +228,16 @@ def _modulus(state: State, pair: int) -> float:
     if scene.axisymmetric:
         return modulus_of(scene, scene.contacts[pair]) or float("nan")
     compliance = 0.0
-    for surface in (scene.contacts[pair].slave, scene.contacts[pair].master):
-        if isinstance(surface, Surface):
-            body = scene.bodies[surface.body]
-            remembers = isinstance(body.materials[0], HistoryMaterial)
-            if remembers or forms.varies(body.materials[0], body.element):
-                return float("nan")
-            dim = scene.dim
-            own = moduli(forms, body.materials[0], body.element)[:: dim + 1, :: dim + 1]
-            along = np.trace(own) / dim
-            across = (own.sum() - np.trace(own)) / (dim * (dim - 1))
-            compliance += along / (along**2 - across**2)
+    for surface in scene.contacts[pair].surfaces:
+        body = scene.bodies[surface.body]
+        remembers = isinstance(body.materials[0], HistoryMaterial)
+        if remembers or forms.varies(body.materials[0], body.element):
+            return float("nan")
+        dim = scene.dim
+        own = moduli(forms, body.materials[0], body.element)[:: dim + 1, :: dim + 1]
+        along = np.trace(own) / dim
+        across = (own.sum() - np.trace(own)) / (dim * (dim - 1))
+        compliance += along / (along**2 - across**2)
     return float(1.0 / compliance)
 
 

@@ -13,12 +13,10 @@ from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._kinematics.base import Kinematics, moment_of
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.foundations import ElasticFoundation
-from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface, named
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import RigidSurface, Roller, Support
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import share_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_sum
@@ -361,13 +359,12 @@ def support_reactions(
 def _uncarried(torn: TornSystem) -> set[str]:
     """Return the tools that bodies meet like obstacles: their rows act on the slave alone."""
     met = np.unique(torn.points.pair[np.diff(torn.points.master.indptr) == 0])
-    masters = (torn.scene.contacts[pair].master for pair in met)
-    return {master.name for master in masters if isinstance(master, RigidTool)}
+    return {torn.scene.contacts[pair].tool for pair in met} - {""}
 
 
 def on_tool(torn: TornSystem, forces: NodalForces, tool: str, about: np.ndarray) -> Resultant:
     """Return the resultant of the contact on a rigid tool, about a point."""
-    pairs = [k for k, pair in enumerate(torn.scene.contacts) if getattr(pair.master, "name", None) == tool]
+    pairs = [k for k, pair in enumerate(torn.scene.contacts) if pair.tool == tool]
     mine = np.flatnonzero(np.isin(torn.points.pair, pairs))
     places, kinematics = torn.points.own[mine] @ forces.places, torn.scene.kinematics
     master = torn.points.master[mine]
@@ -529,7 +526,7 @@ def force_balance(
     forces.
     """
     if about is None:
-        carriers = [isinstance(body, ToolBody) for body in torn.scene.bodies.values()]
+        carriers = [body.is_rigid for body in torn.scene.bodies.values()]
         of_tool = np.repeat(carriers, np.diff(torn.decomposition.tearing.node_offset))
     point = _middle(forces.places[~of_tool]) if about is None else point_of(about, torn.scene.dim)
     parts, kinematics = _parts(torn, forces), torn.scene.kinematics
@@ -557,8 +554,7 @@ def force_balance(
 
 def _parts(torn: TornSystem, forces: NodalForces) -> dict[str, np.ndarray]:
     """Return the nodal forces of each part, shape (n_nodes, dim)."""
-    masters = [pair.master for pair in torn.scene.contacts]
-    tools = np.array([isinstance(master, RigidTool) for master in masters], dtype=bool)[torn.points.pair]
+    tools = np.array([bool(pair.tool) for pair in torn.scene.contacts], dtype=bool)[torn.points.pair]
     meets_body = np.diff(torn.points.master.indptr) > 0
     driven = np.flatnonzero(tools & ~meets_body)  # supports of such a tool hold what presses on it
     parts = {

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._base.display import displayed
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.forces import NodalForces, on_tool
@@ -67,7 +66,7 @@ def tool_results(torn: TornSystem, forces: NodalForces, motions: Iterable[RigidM
     scene, found = torn.scene, ToolResults()
     for motion in motions:
         name = motion.surface.body
-        if isinstance(scene.bodies[name], ToolBody):
+        if scene.bodies[name].is_rigid:
             point = motion.about + (motion.displacement if scene.deforms_much else 0.0)
             total = on_tool(torn, forces, name, point)
             found[name] = ToolResult(motion.displacement, motion.rotation, total.force, total.moment)

@@ -45,7 +45,7 @@ def test_a_tool_is_that_of_the_package() -> None:
     motion = ToolMotion("ball", (0, 0, None), (0, None, 0), (0, 0, -5), (0, 0, 0), (0, 0, 30), (0, 2, 0))
     assert scene.contacts[0].master == tool
     assert scene.supports == (motion.of(tool.at),)
-    assert scene.bodies["ball"].springs == (0, 0, 30, 0, 2, 0)  # type: ignore[attr-defined]
+    assert list(scene.bodies["ball"].springs) == [0, 0, 30, 0, 2, 0]
     plane = {
         "meshes": {"m": {"shape": "rectangle", "lower": [0, 0], "upper": [2, 1], "counts": [4, 2]}},
         "materials": {"s": {**STEEL, "model": "plane_strain"}},

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 import numpy as np
@@ -177,9 +178,8 @@ def require_inside(scene: Scene) -> None:
     """Reject masters that end at a side of a sector: nodes that slide over it would meet the neighbour's."""
     for sector in scene.sectors:
         for pair in scene.contacts:
-            for side in (sector.slave, sector.master):
-                master = pair.master
-                if not isinstance(master, Surface) or master.body != side.body:
+            for side, master in product(sector.surfaces, pair.surfaces[1:]):
+                if master.body != side.body:
                     continue
                 surfaces = scene.bodies[side.body].mesh.surfaces
                 if np.isin(surfaces[master.name], surfaces[side.name]).any():

@@ -16,7 +16,7 @@ from fenics_contact._pairing.sliding.means import MovingMeans
 from fenics_contact._pairing.sliding.meeting import Candidates, Found, Moved, SlidingPair
 from fenics_contact._pairing.sliding.patches import SmoothPatches
 from fenics_contact._pairing.sliding.stiffness import Differential, without_patches
-from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import shape_functions
 from fenics_contact._surfaces.projection import Projection, join
@@ -32,7 +32,7 @@ class OnSurface(SlidingPair):
     @classmethod
     def serves(cls, pair: ContactPair) -> bool:
         """Surfaces of bodies."""
-        return isinstance(pair.master, Surface)
+        return pair.between_bodies
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from fenics_contact._pairing.masters import ToolMaster, carried
 from fenics_contact._pairing.sliding.meeting import Found, Moved
 from fenics_contact._pairing.sliding.obstacles import OnObstacle
 from fenics_contact._pairing.sliding.stiffness import Differential
-from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair
 
 
@@ -24,7 +23,7 @@ class OnTool(OnObstacle):
     @classmethod
     def serves(cls, pair: ContactPair) -> bool:
         """Tools."""
-        return isinstance(pair.master, RigidTool)
+        return bool(pair.tool)
 
     def _found(self, moved: Moved) -> Found:
         """Return points; those of a loose tool are like those on a body, of the nodes that carry it.
