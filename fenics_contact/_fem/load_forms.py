@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,21 +30,37 @@ from fenics_contact.materials.hyperelastic import is_nonlinear
 
 #: First number of the coefficients of loads, after those of displacement fields.
 FIRST_COUNT = 4
-KIND = {
-    BodyForce: "body force", ThermalStrain: "thermal strain", InitialStress: "initial stress",
-    Pressure: "pressure",
-}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What the forms of one type of loads have in common.
+
+    `scalar`: whether values are; `cellwise`: whether they are given by cells; `of_materials`: whether the
+    form has the constants of materials, and is integrated over the cells of each; `work`: see `load_work`.
+    """
+
+    name: str
+    work: Callable[[Any, tuple[Material, ...], Element, Expr, Expr], tuple[ufl.Form, Constants]]
+    scalar: bool = False
+    cellwise: bool = False
+    of_materials: bool = False
+
+
+def kind_of(load: Load) -> Kind:
+    """Return the kind of a load's form."""
+    return KINDS.get(type(load), ON_SURFACE)
 
 
 def is_scalar(load: Load) -> bool:
     """Return whether the value of a load is a scalar."""
-    return isinstance(load, Pressure | ThermalStrain)
+    return kind_of(load).scalar
 
 
 def load_name(load: Load, element: Element) -> tuple[str, str, str]:
     """Return the name of the form of a load: kind, type of its value, cell type."""
     given = "UFL" if isinstance(load.value, Ufl) else "of position" if callable(load.value) else "numbers"
-    kind = KIND.get(type(load), "surface load") + " on a region" * (region_of(load) is not None)
+    kind = kind_of(load).name + " on a region" * (region_of(load) is not None)
     return (kind, given, element.name)
 
 
@@ -57,15 +74,15 @@ def loaded_cells(
 ) -> dict[int, np.ndarray] | None:
     """Return the cells of one mesh by the tags of a load's form, None if it has none."""
     region = region_of(load)
-    if region is not None and not isinstance(load, InitialStress):
+    if region is not None and not kind_of(load).cellwise:
         return {LOADED: np.flatnonzero(np.isin(cells, body.mesh.regions[region]))}
-    return parts.cells if isinstance(load, ThermalStrain) else None
+    return parts.cells if kind_of(load).of_materials else None
 
 
 def load_key(load: Load, materials: tuple[Material, ...], element: Element) -> tuple[Hashable, ...]:
     """Return the key of everything on which the form of a load depends."""
     own = load.value if isinstance(load.value, Ufl) else None
-    return (*load_name(load, element), element, own, materials if isinstance(load, ThermalStrain) else ())
+    return (*load_name(load, element), element, own, materials if kind_of(load).of_materials else ())
 
 
 class Symbol:
@@ -76,7 +93,7 @@ class Symbol:
         width = element.components
         self.constants: Constants = ()
         self.coefficients: tuple[ufl.Coefficient, ...] = ()
-        if isinstance(load, InitialStress):
+        if kind_of(load).cellwise:
             space = element.cellwise((6,))
             self.expression = ufl.Coefficient(space, count=FIRST_COUNT + number)
             self.coefficients = (self.expression,)
@@ -108,7 +125,7 @@ def from_ufl(load: Load, value: Ufl, element: Element) -> Expr:
 
 def numbers_of(load: Load) -> tuple[float, ...]:
     """Return the values of a symbol's constants."""
-    if callable(load.value) or isinstance(load.value, Ufl) or isinstance(load, InitialStress):
+    if callable(load.value) or isinstance(load.value, Ufl) or kind_of(load).cellwise:
         return ()
     return tuple(load.value) if isinstance(load.value, Sequence) else (float(load.value),)
 
@@ -124,7 +141,7 @@ def load_fields(
 
     `acted`: marks of the nodes on the load's surface; the value is asked for only there.
     """
-    if isinstance(load, InitialStress):
+    if kind_of(load).cellwise:
         assert of_cells is not None
         return (_dolfinx.cell_field(space.mesh, "initial_stress", of_cells),)
     if isinstance(load.value, Ufl) or not callable(load.value):
@@ -143,37 +160,67 @@ def load_fields(
 
 def has_work(load: Load, materials: tuple[Material, ...]) -> bool:
     """Return whether a load has a form: nonlinear materials feel temperatures themselves."""
-    return not isinstance(load, ThermalStrain) or not all(map(is_nonlinear, materials))
+    return not kind_of(load).of_materials or not all(map(is_nonlinear, materials))
 
 
 def load_work(
     load: Load, materials: tuple[Material, ...], element: Element, value: Expr, v: Expr
 ) -> tuple[ufl.Form, Constants]:
     """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it."""
-    if isinstance(load, ThermalStrain):
-        (along,) = element.in_space(v)
+    return kind_of(load).work(load, materials, element, value, v)
 
-        def thermal(material: Any, constants: Constants) -> Expr | None:
-            if is_nonlinear(material):
-                return None  # it feels the temperature itself
-            work = value * ufl.inner(material.thermal_stress(constants), strain(along))
-            return material.per_area(work, constants) if isinstance(material, Plate) else work
 
-        return integrate(materials, element, thermal, volume_measure(element, 2))
-    if isinstance(load, InitialStress):
-        (along,) = element.in_space(v)
-        size = len(along)
-        work = -ufl.inner(
-            ufl.as_matrix([[as_stress(value)[i, j] for j in range(size)] for i in range(size)]), strain(along)
-        )
-        return element.integrand(element.on_cells(work)) * volume_measure(element), ()
-    work = ufl.dot(value, v) if not isinstance(load, Pressure) else None
-    if work is None:
-        normal = ufl.FacetNormal(element.template)
-        work = -value * ufl.dot(normal, element.kinematics.in_section(v))
-    measure = volume_measure(element, 2) if isinstance(load, BodyForce) else surface_measure(element)
-    measure = measure if region_of(load) is None else measure(LOADED)
-    return element.integrand(work) * measure, ()
+def _thermal_work(
+    load: ThermalStrain, materials: tuple[Material, ...], element: Element, value: Expr, v: Expr
+) -> tuple[ufl.Form, Constants]:
+    (along,) = element.in_space(v)
+
+    def thermal(material: Any, constants: Constants) -> Expr | None:
+        if is_nonlinear(material):
+            return None  # it feels the temperature itself
+        work = value * ufl.inner(material.thermal_stress(constants), strain(along))
+        return material.per_area(work, constants) if isinstance(material, Plate) else work
+
+    return integrate(materials, element, thermal, volume_measure(element, 2))
+
+
+def _stress_work(
+    load: InitialStress, materials: tuple[Material, ...], element: Element, value: Expr, v: Expr
+) -> tuple[ufl.Form, Constants]:
+    (along,) = element.in_space(v)
+    axes, stress = range(len(along)), as_stress(value)
+    work = -ufl.inner(ufl.as_matrix([[stress[i, j] for j in axes] for i in axes]), strain(along))
+    return element.integrand(element.on_cells(work)) * volume_measure(element), ()
+
+
+def _body_work(
+    load: BodyForce, materials: tuple[Material, ...], element: Element, value: Expr, v: Expr
+) -> tuple[ufl.Form, Constants]:
+    measure = volume_measure(element, 2)
+    measure = measure if load.region is None else measure(LOADED)
+    return element.integrand(ufl.dot(value, v)) * measure, ()
+
+
+def _pressure_work(
+    load: Pressure, materials: tuple[Material, ...], element: Element, value: Expr, v: Expr
+) -> tuple[ufl.Form, Constants]:
+    work = -value * ufl.dot(ufl.FacetNormal(element.template), element.kinematics.in_section(v))
+    return element.integrand(work) * surface_measure(element), ()
+
+
+def _surface_work(
+    load: Load, materials: tuple[Material, ...], element: Element, value: Expr, v: Expr
+) -> tuple[ufl.Form, Constants]:
+    return element.integrand(ufl.dot(value, v)) * surface_measure(element), ()
+
+
+ON_SURFACE = Kind("surface load", _surface_work)
+KINDS = {
+    BodyForce: Kind("body force", _body_work),
+    ThermalStrain: Kind("thermal strain", _thermal_work, scalar=True, of_materials=True),
+    InitialStress: Kind("initial stress", _stress_work, cellwise=True),
+    Pressure: Kind("pressure", _pressure_work, scalar=True),
+}
 
 
 def as_stress(vector: Expr) -> Expr:
@@ -183,4 +230,4 @@ def as_stress(vector: Expr) -> Expr:
 
 def load_parameters(load: Load, parts: Composition) -> tuple[float, ...]:
     """Return the values of the constants of a load's form: its own, then those of the materials."""
-    return numbers_of(load) + (parts.parameters if isinstance(load, ThermalStrain) else ())
+    return numbers_of(load) + (parts.parameters if kind_of(load).of_materials else ())
