@@ -11,7 +11,7 @@ from scipy.linalg import eigvalsh
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refined_again
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.supports import AnySupport, RigidSurface, Support
+from fenics_contact._scene.supports import AnySupport
 from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.mesh.cell_types import CELL_TYPES
 
@@ -134,11 +134,7 @@ def _extremes(place: np.ndarray, values: np.ndarray, size: int) -> tuple[np.ndar
 
 def _fixed(body: Body, supports: Sequence[AnySupport]) -> np.ndarray:
     """Return the ends of the facets that supports move as rigid pieces, (n, 2)."""
-    rigid = [
-        each
-        for each in supports
-        if isinstance(each, RigidSurface) or (isinstance(each, Support) and None not in each.value)
-    ]
+    rigid = [each for each in supports if each.holds(body.components).all()]
     facets = [body.mesh.surfaces[each.surface] for each in rigid if each.surface in body.mesh.surfaces]
     return np.concatenate([np.zeros((0, 2), dtype=np.int64), *(each[:, :2] for each in facets)])
 

@@ -39,7 +39,6 @@ from fenics_contact._large_deformations.rigid_surfaces import driven_further
 from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.local_axes import free_part
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import nodal_mean_transposed, nodal_sum
@@ -246,10 +245,7 @@ class DeformedEquilibria:
         What supports carried that are released acts as forces of the state before: they fall to zero in the
         step.
         """
-        places = [
-            {(each.body, each.surface) for each in at.supports if isinstance(each, RigidSurface)}
-            for at in (before.scene, scene)
-        ]
+        places = [{(each.body, each.surface) for each in at.rigid_surfaces} for at in (before.scene, scene)]
         if new := sorted(places[1] - places[0]):
             raise InvalidInputError(
                 f"a RigidSurface must be there from the first step on, that on surface {new[0][1]!r} of body "

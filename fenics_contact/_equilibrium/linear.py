@@ -24,7 +24,6 @@ from fenics_contact._equilibrium.stored import Stored, restored_solution, with_s
 from fenics_contact._pairing.inside import InFacets
 from fenics_contact._scene.plan import SolverKind
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.feti.dual import DualSystem
@@ -236,5 +235,4 @@ def _checked(torn: TornSystem, known: State | None) -> TornSystem:
 
 def _loads_of(torn: TornSystem) -> tuple[list[Any], ...]:
     """Return the loads of a system, the rigid surfaces, at whose points loads act, and those of unknowns."""
-    rigid = [each for each in torn.scene.supports if isinstance(each, RigidSurface)]
-    return list(torn.scene.loads), rigid, torn.free.load.tolist()
+    return list(torn.scene.loads), list(torn.scene.rigid_surfaces), torn.free.load.tolist()

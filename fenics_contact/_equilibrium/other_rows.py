@@ -11,7 +11,7 @@ from fenics_contact._equilibrium.starts import carried_over
 from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.local_axes import same_axes
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.supports import AnySupport, HoldCurrent, RigidSurface, Roller, Support
+from fenics_contact._scene.supports import AnySupport
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.decomposition import Decomposition, prescribed_along
@@ -41,60 +41,52 @@ def prescribed_as_is(torn: TornSystem, displacement: np.ndarray, after: Decompos
 def _moving(torn: TornSystem) -> np.ndarray:
     """Return the nodes of rigid surfaces whose motion is not prescribed, shape (n_nodes,)."""
     marks = np.zeros(torn.decomposition.tearing.n_nodes, dtype=bool)
-    for support in torn.scene.supports:
-        if isinstance(support, RigidSurface) and support.free.any():
-            own = torn.scene.bodies[support.body].mesh.nodes_to_hold(support.surface)
-            marks[torn.decomposition.tearing.global_nodes(support.body, own)] = True
+    for surface in torn.scene.rigid_surfaces:
+        if surface.free.any():
+            own = torn.scene.bodies[surface.body].mesh.nodes_to_hold(surface.surface)
+            marks[torn.decomposition.tearing.global_nodes(surface.body, own)] = True
     return marks
 
 
 def with_kept(scene: Scene, before: State | None) -> Scene:
     """Return the scene of a load step with the displacements that its supports keep. Collective."""
-    if before is None or not any(_keeps(support) for support in scene.supports):
+    if before is None or not any(support.keeps for support in scene.supports):
         return scene
     return replace(scene, supports=[_kept(support, scene, before) for support in scene.supports])
 
 
 def require_values_to_keep(step: LoadStep, scene: Scene) -> None:
     """Reject supports that are functions of time and keep what nodes have: they are asked on the way, too."""
-    if callable(step.supports) and any(_keeps(support) for support in scene.supports):
+    if callable(step.supports) and any(support.keeps for support in scene.supports):
         raise InvalidInputError(
             f"supports of LoadStep {step.name!r} that are functions of time must have values, "
             "got HoldCurrent: give those that keep what they have in a list, supports=[...]"
         )
 
 
-def _keeps(support: AnySupport) -> bool:
-    if isinstance(support, Roller):
-        return isinstance(support.displacement, HoldCurrent)
-    return isinstance(support, Support) and any(isinstance(each, HoldCurrent) for each in support.value)
-
-
 def _kept(support: AnySupport, scene: Scene, before: State) -> AnySupport:
     """Return a support with displacements of a state where it keeps them. Collective."""
-    if not isinstance(support, Support | Roller) or not _keeps(support):
+    if not support.keeps:
         return support
     mesh, tearing = scene.bodies[support.body].mesh, before.torn.decomposition.tearing
-    if isinstance(support, Support):
-        nodes, directions = mesh.nodes_to_hold(support.surface), None
-    else:
-        held = scene.directions_of(support)
-        nodes, directions = held.nodes, held.directions
+    for roller in support.rollers:
+        held = scene.directions_of(roller)
+        moved = _moved_at(before, tearing.global_nodes(roller.body, held.nodes))
+        along = np.einsum("nd,nd->n", moved, held.directions)
+        return replace(roller, displacement=NodeValues(mesh.points[held.nodes], along))
+    nodes = mesh.nodes_to_hold(support.surface)
     every = tearing.global_nodes(support.body, nodes)
-    moved = nodal_mean_at(before.torn.decomposition, before.torn_displacement, every)
-    if isinstance(support, Roller):
-        assert directions is not None
-        along = np.einsum("nd,nd->n", moved, directions)
-        return replace(support, displacement=NodeValues(mesh.points[nodes], along))
+    moved = _moved_at(before, every)
     known, axes = prescribed_along(before.torn.scene, tearing)
     plain = ~_moving(before.torn)
     plain[axes.nodes] = False
     moved = np.where(~np.isnan(known[every]) & plain[every, None], known[every], moved)
-    value = [
-        NodeValues(mesh.points[nodes], moved[:, k]) if isinstance(each, HoldCurrent) else each
-        for k, each in enumerate(support.value)
-    ]
-    return replace(support, value=tuple(value))
+    return support.keeping(mesh.points[nodes], moved)
+
+
+def _moved_at(before: State, nodes: np.ndarray) -> np.ndarray:
+    """Return the displacements of nodes of a state, (n, components), [length]. Collective."""
+    return nodal_mean_at(before.torn.decomposition, before.torn_displacement, nodes)
 
 
 def kept_by_joints(before: State) -> dict[str, np.ndarray]:

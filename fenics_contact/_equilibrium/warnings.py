@@ -18,9 +18,10 @@ from fenics_contact._equilibrium.corners_inside import corner_between_nodes
 from fenics_contact._equilibrium.peaks import coarse_peak, unmatched_nodes
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.local_axes import TILT
 from fenics_contact._scene.pair_geometry import Outline, bodies_near, outline_of, unpaired
 from fenics_contact._scene.pairs import ContactPair, Surface
-from fenics_contact._scene.parts import TILT, surface_of
+from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.plausible import odd_values
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import outside, share_areas

@@ -63,9 +63,7 @@ class TurnedSurface:
     def all_of(cls, scene: Scene, decomposition: Decomposition) -> tuple[TurnedSurface, ...]:
         """Return those of a scene that turn far, or have free components."""
         found = []
-        for support in scene.supports:
-            if not isinstance(support, RigidSurface):
-                continue
+        for support in scene.rigid_surfaces:
             body = scene.bodies[support.body]
             if not (body.deforms_much or support.free.any()):
                 continue

@@ -15,7 +15,6 @@ from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.corners import exchanged, is_held, with_corner_as_slave
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
-from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._scene.surface_laws import ClosureLaw, check_closing
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
@@ -178,16 +177,7 @@ def _mean_size(corners: np.ndarray) -> float:
 
 def _largest_motion(scene: SceneParts) -> float:
     """Return the largest displacement that supports prescribe, [length]."""
-    sizes = [0.0]
-    for support in scene.supports:
-        if isinstance(support, Roller):
-            mesh = scene.bodies[support.body].mesh
-            values = support.amounts(mesh.points[np.unique(mesh.surfaces[support.surface])])[:, None]
-        else:
-            assert not isinstance(support, ToolMotion)
-            values = np.nan_to_num(scene.given(support)[1])
-        sizes.append(float(np.linalg.norm(values, axis=1).max(initial=0.0)))
-    return max(sizes)
+    return max([0.0, *(support.largest_motion(scene) for support in scene.supports)])
 
 
 def _nothing_found(meshes: dict[str, BodyMesh], distance: float) -> str:

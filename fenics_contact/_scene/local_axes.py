@@ -14,6 +14,9 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import vector_areas
 
+#: Directions are the same if the cosine of the angle between them differs from one by no more than this.
+TILT = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class LocalAxes:

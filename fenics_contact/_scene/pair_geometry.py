@@ -26,8 +26,6 @@ from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.sectors import AnyTie
-from fenics_contact._scene.supports import RigidSurface, Roller, ToolMotion
-from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface, gauss_points, heights, quadrature_areas
 from fenics_contact._surfaces.projection import project
 from fenics_contact.materials.elastic import PlaneStress, isotropic_constants
@@ -51,18 +49,7 @@ LINE = 1e-2
 
 def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
     """Return the largest displacement along a direction that a support prescribes as a number, [length]."""
-    sizes = [0.0]
-    for support in scene.supports:
-        if isinstance(support, Roller):
-            along = support.direction_on(scene.bodies[support.body].mesh)
-            if along is not None and not callable(support.displacement):
-                sizes.append(abs(support.displacement * float(along @ normal)))
-            continue
-        assert not isinstance(support, ToolMotion)
-        given = (support.motion if isinstance(support, RigidSurface) else support.value)[: scene.dim]
-        value = [0.0 if number is None or callable(number) else number for number in given]
-        sizes.append(abs(float(np.array(value) @ normal)))
-    return max(sizes)
+    return max([0.0, *(support.motion_along(normal, scene) for support in scene.supports)])
 
 
 def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
@@ -76,9 +63,9 @@ def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
         if resultant is None:
             return None
         total[load.body] += resultant[: scene.dim]
-    for support in scene.supports:
-        if isinstance(support, RigidSurface) and isinstance(scene.bodies[support.body], ToolBody):
-            total[support.body] += support.load[: scene.dim]
+    for surface in scene.rigid_surfaces:
+        if scene.bodies[surface.body].is_rigid:
+            total[surface.body] += surface.load[: scene.dim]
     return max(abs(float(force @ normal)) for force in total.values())
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
+import numpy as np
+
 from fenics_contact._scene.effects import EffectName
+from fenics_contact._surfaces.facets import surface_moments
 from fenics_contact.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -53,6 +56,14 @@ class Part:
     def effects(self, scene: Around) -> tuple[EffectName, ...]:
         """Return the physical effects that the part calls for."""
         return (self.effect,)
+
+
+def centroid(scene: Around, body: str, surface: str) -> np.ndarray:
+    """Return the centroid of a surface, of a node set the mean of its points, shape (dim,)."""
+    mesh = scene.bodies[body].mesh
+    if surface in mesh.node_sets:
+        return np.asarray(mesh.points[mesh.node_sets[surface]].mean(axis=0))
+    return surface_moments(mesh.points, mesh.surfaces[surface], scene.kinematics.measure).centroid
 
 
 def body_of(scene: Around, name: str, user: str) -> Body:

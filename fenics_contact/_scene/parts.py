@@ -18,9 +18,9 @@ from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import Load, Pressure
 from fenics_contact._scene.local_axes import (
     NO_AXES,
+    TILT,
     HeldDirections,
     LocalAxes,
-    flat_normal,
     held_along,
     same_axes,
 )
@@ -31,7 +31,7 @@ from fenics_contact._scene.revolution import hold_axis, require_all_or_none, req
 from fenics_contact._scene.rollers import held_directions
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.springs import Spring
-from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support, ToolMotion
+from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller
 from fenics_contact._scene.thickness import require_thickness
 from fenics_contact._scene.tools import ToolBody, bodies_with_tools, tools_in, with_motions
 from fenics_contact._surfaces.corners import facing_area, sharp_nodes
@@ -40,7 +40,6 @@ from fenics_contact._surfaces.true_surface import Geometry, true_surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import vector_areas
 
 if TYPE_CHECKING:
     from fenics_contact._surfaces.continued import Neighbour
@@ -197,8 +196,7 @@ class SceneParts:
         chosen = self.supports if supports is None else supports
         values = np.full((self.bodies[body].mesh.n_nodes, self.components), np.nan)
         for support in chosen:
-            if support.body == body and not isinstance(support, Roller | ToolMotion):
-                nodes, given = self.given(support)
+            for nodes, given in support.held(self) if support.body == body else ():
                 values[nodes] = np.where(np.isnan(given), values[nodes], given)
         hold_axis(self.bodies[body], body, values)
         return self.held_by_rollers(body, values, chosen)
@@ -211,10 +209,20 @@ class SceneParts:
     @property
     def rolling_bodies(self) -> tuple[str, ...]:
         """Names of the bodies with rollers, or with a side of a sector, which may end at the axis."""
-        rolling = {support.body for support in self.supports if isinstance(support, Roller)}
+        rolling = {roller.body for roller in self.rollers}
         for sector in self.sectors:
             rolling |= {*sector.bodies}
         return tuple(name for name in self.bodies if name in rolling)
+
+    @property
+    def rollers(self) -> tuple[Roller, ...]:
+        """The rollers among its supports."""
+        return tuple(chain.from_iterable(support.rollers for support in self.supports))
+
+    @property
+    def rigid_surfaces(self) -> tuple[RigidSurface, ...]:
+        """The rigid surfaces among its supports, those of tools included."""
+        return tuple(chain.from_iterable(support.rigid_surfaces for support in self.supports))
 
     @property
     def sectors(self) -> tuple[CyclicSymmetry, ...]:
@@ -229,8 +237,8 @@ class SceneParts:
         `prescribed`: those of other supports, NaN where free, shape (n_nodes, dim), [length].
         """
         chosen = self.supports if supports is None else supports
-        rollers = [each for each in chosen if isinstance(each, Roller) and each.body == body]
-        held = [self.directions_of(roller) for roller in rollers]
+        rollers = chain.from_iterable(each.rollers for each in chosen)
+        held = [self.directions_of(roller) for roller in rollers if roller.body == body]
         if supports is None:
             held += self._held_on_axes(body)
         if not any(len(each.nodes) for each in held):
@@ -249,15 +257,6 @@ class SceneParts:
         """Return along what a roller holds which nodes of its body, and by how much they move."""
         mesh = self.bodies[roller.body].mesh
         return held_directions(mesh, roller, mirrored(self, roller.body), planes_of(self))
-
-    def given(self, support: Support | RigidSurface) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nodes of a support, ascending, and what it prescribes, NaN where free, (n, dim)."""
-        body = self.bodies[support.body]
-        nodes = body.mesh.nodes_to_hold(support.surface)
-        points = body.mesh.points[nodes]
-        if isinstance(support, RigidSurface) and body.deforms_much:
-            return nodes, support.turned(points, support.prescribed)
-        return nodes, support.values(points)
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -342,29 +341,13 @@ def _require_different(pairs: Sequence[ContactPair | AnyTie]) -> None:
                 )
 
 
-#: Directions are the same if the cosine of the angle between them differs from one by no more than this.
-TILT = 1e-9
-
-
 def planes_of(scene: SceneParts) -> np.ndarray:
     """Return the normals of planes of symmetry, the axes first, shape (n_planes, dim)."""
     planes = [*np.eye(scene.dim)]
-    for support in scene.supports:
-        normal = _plane(scene, support)
-        if normal is not None and np.max(np.abs(planes @ normal)) < 1.0 - TILT:
+    for normal, _ in chain.from_iterable(roller.symmetry(scene) for roller in scene.rollers):
+        if np.max(np.abs(planes @ normal)) < 1.0 - TILT:
             planes.append(normal)
     return np.array(planes)
-
-
-def _plane(scene: SceneParts, support: AnySupport) -> np.ndarray | None:
-    """Return the normal of the flat side that a roller holds across, if it is one of symmetry."""
-    if not isinstance(support, Roller) or callable(support.displacement) or callable(support.direction):
-        return None
-    mesh = scene.bodies[support.body].mesh
-    normal = flat_normal(mesh, support.surface)
-    if normal is None or abs(support.direction_on(mesh) @ normal) < 1.0 - TILT:
-        return None
-    return normal if scene.kinematics.is_mirrored(normal, TILT) else None
 
 
 def mirrored(scene: SceneParts, body: str) -> np.ndarray:
@@ -375,23 +358,9 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
     """
     mesh, planes = scene.bodies[body].mesh, planes_of(scene)
     marks = np.zeros((mesh.n_nodes, len(planes)), dtype=bool)
-    for support in scene.supports:
-        if support.body != body or isinstance(support, RigidSurface | ToolMotion):
-            continue
-        if isinstance(support, Roller):
-            normal = _plane(scene, support)
-            if normal is not None:
-                marks[mesh.surfaces[support.surface].ravel(), np.argmax(np.abs(planes @ normal))] = True
-            continue
-        given = [axis for axis, value in enumerate(support.value) if value is not None]
-        if len(given) != 1 or callable(support.value[given[0]]) or given[0] >= scene.dim:
-            continue
-        if support.surface in mesh.node_sets:
-            continue
-        facets = mesh.surfaces[support.surface]
-        areas = vector_areas(mesh.points, facets)
-        across = np.abs(areas[:, given[0]]) >= (1.0 - TILT) * np.linalg.norm(areas, axis=1)
-        marks[facets[across].ravel(), given[0]] = True
+    mine = (support for support in scene.supports if support.body == body)
+    for normal, nodes in chain.from_iterable(support.symmetry(scene) for support in mine):
+        marks[nodes, np.argmax(np.abs(planes @ normal))] = True
     marks[scene.bodies[body].on_axis, 0] = True
     return marks
 

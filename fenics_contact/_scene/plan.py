@@ -47,7 +47,7 @@ def held_components(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarr
     `modes`: motions at its nodes, shape (n_nodes, dim, n_modes).
     """
     mesh = scene.bodies[body].mesh
-    loose = [each for each in scene.supports if isinstance(each, RigidSurface) and each.free.any()]
+    loose = [each for each in scene.rigid_surfaces if each.free.any()]
     firm = [each for each in scene.supports if each not in loose]
     prescribed, axes = scene.prescribed_along(body, firm)
     rows = [axes.to_local(modes)[~np.isnan(prescribed)]]
@@ -60,8 +60,8 @@ def held_components(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarr
 def point_loads(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarray:
     """Return the work of the loads at points of rigid surfaces of a body on its rigid motions, (n_modes,)."""
     total = np.zeros(modes.shape[2])
-    for surface in scene.supports:
-        if isinstance(surface, RigidSurface) and surface.body == body and surface.load.any():
+    for surface in scene.rigid_surfaces:
+        if surface.body == body and surface.load.any():
             moved, factors = _of_point(surface, scene.bodies[body].mesh, modes)
             total += (factors * surface.load) @ moved
     return total
@@ -198,7 +198,7 @@ def make_plan(
     subdomains, unknowns = len(parts.size), int(parts.size.sum())
     solver = choose_solver(scene, subdomains, sensitivity=sensitivity)
     direct = solver is SolverKind.DIRECT
-    loose = sum(int(s.free.sum()) for s in scene.supports if isinstance(s, RigidSurface))
+    loose = sum(int(surface.free.sum()) for surface in scene.rigid_surfaces)
     loose += sum(preload.is_free for preload in scene.preloads)
     each = next(iter(scene.bodies.values())).motions
     motions = 0 if direct else subdomains * each + loose
@@ -242,7 +242,7 @@ def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = Fal
     if EffectName.CONTACT in effects:
         return SolverKind.FACE_NEWTON
     # A body that its supports alone do not hold has a singular stiffness; ties need multipliers.
-    loose = any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports)
+    loose = any(surface.free.any() for surface in scene.rigid_surfaces)
     loose = loose or bool(scene.preloads or scene.ties or scene.springs or scene.constraints)
     if subdomains == 1 and not (sensitivity or loose) and held_by_supports(scene, scene.body_names[0]):
         return SolverKind.DIRECT

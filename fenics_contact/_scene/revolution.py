@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.supports import AnySupport, Roller
+from fenics_contact._scene.supports import AnySupport
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import is_nonlinear
 
@@ -58,7 +58,7 @@ def require_simple_torsion(
     """
     used = {
         "linear materials": any(is_nonlinear(m) for body in bodies for m in body.materials),
-        "no rollers": any(isinstance(support, Roller) for support in supports),
+        "no rollers": any(support.rollers for support in supports),
         **others,
     }
     for needed, given in used.items():

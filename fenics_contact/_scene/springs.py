@@ -10,8 +10,8 @@ from fenics_contact._base.checks import GivenVector, checked, floats
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.pairs import Surface
-from fenics_contact._scene.part import Around, Part, require_nodes
-from fenics_contact._surfaces.facets import nodal_areas, surface_moments
+from fenics_contact._scene.part import Around, Part, centroid, require_nodes
+from fenics_contact._surfaces.facets import nodal_areas
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.faces import of_one_shape
 
@@ -170,8 +170,4 @@ def mean_weights(scene: Around, surface: Surface) -> tuple[np.ndarray, np.ndarra
 def _centre(scene: Around, end: Surface | GivenVector) -> np.ndarray:
     if not isinstance(end, Surface):
         return np.asarray(end, dtype=np.float64)
-    mesh = scene.bodies[end.body].mesh
-    if end.name in mesh.node_sets:
-        return np.asarray(mesh.points[mesh.node_sets[end.name]].mean(axis=0))
-    measure = scene.bodies[end.body].kinematics.measure
-    return surface_moments(mesh.points, mesh.surfaces[end.name], measure).centroid
+    return centroid(scene, end.body, end.name)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -11,12 +12,13 @@ from scipy.spatial.transform import Rotation
 from fenics_contact._base.checks import LARGEST, GivenVector, checked, floats, unit_vector
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.effects import EffectName
-from fenics_contact._scene.fields import OfPosition, evaluate
-from fenics_contact._scene.local_axes import flat_normal, widest_angle
-from fenics_contact._scene.part import Around, Part, require_nodes, require_vector
+from fenics_contact._scene.fields import NodeValues, OfPosition, evaluate
+from fenics_contact._scene.local_axes import TILT, flat_normal, widest_angle
+from fenics_contact._scene.part import Around, Part, centroid, require_nodes, require_vector
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.kernels import motions_about
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import vector_areas
 
 #: What a support does with one component: leave it free (None), or prescribe a number or a function of the
 #: points.
@@ -39,9 +41,89 @@ class HoldCurrent:
         return np.zeros(len(points))
 
 
+class SupportPart(Part):
+    """What all supports answer.
+
+    Attributes:
+        body: Name of the body.
+        surface: Name of its surface, or of a node set of its mesh.
+    """
+
+    body: str
+    surface: str
+
+    @property
+    def rollers(self) -> tuple[Roller, ...]:
+        """The support, if it is a roller."""
+        return ()
+
+    @property
+    def rigid_surfaces(self) -> tuple[RigidSurface, ...]:
+        """The support, if it is a rigid surface."""
+        return ()
+
+    @property
+    def keeps(self) -> bool:
+        """Whether it holds something where it is when a load step begins, see `HoldCurrent`."""
+        return False
+
+    @property
+    def varies(self) -> bool:
+        """Whether it has values that are functions of position."""
+        return False
+
+    def keeping(self, points: np.ndarray, moved: np.ndarray) -> Self:
+        """Return it with displacements of its nodes, (n, components), where it keeps them."""
+        return self
+
+    def nodes_in(self, mesh: BodyMesh) -> np.ndarray:
+        """Return its nodes in the mesh of its body, ascending."""
+        return mesh.nodes_of(self.surface)
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Return what it prescribes at points, NaN where it prescribes nothing."""
+        return np.full(points.shape, np.nan)
+
+    def holds(self, components: int) -> np.ndarray:
+        """Return which components it holds along the axes, shape (components,)."""
+        return np.ones(components, dtype=bool)
+
+    def held(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Return its nodes, ascending, and what it prescribes there along the axes, NaN where free.
+
+        Shapes (n,) and (n, components); nothing of rollers, which hold along directions of their own.
+        """
+        mesh = scene.bodies[self.body].mesh
+        nodes = mesh.nodes_to_hold(self.surface)
+        return ((nodes, self.values(mesh.points[nodes])),)
+
+    def largest_motion(self, scene: Around) -> float:
+        """Return the largest displacement that it prescribes, [length]."""
+        values = (np.nan_to_num(given) for _, given in self.held(scene))
+        return max(float(np.linalg.norm(each, axis=1).max(initial=0.0)) for each in values)
+
+    def motion_along(self, normal: np.ndarray, scene: Around) -> float:
+        """Return the largest displacement along a direction that it prescribes by numbers, [length]."""
+        return 0.0
+
+    def symmetry(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Return the normal of the plane of symmetry for which it stands, if any, and its nodes there."""
+        return ()
+
+    def reference(self, scene: Around) -> np.ndarray:
+        """Return the point to which its reaction refers, shape (dim,): the centroid of its surface."""
+        return centroid(scene, self.body, self.surface)
+
+
+def _along(motion: Sequence[Component], normal: np.ndarray) -> float:
+    """Return the size of what a motion has along a direction, without what is free or a function."""
+    value = [0.0 if number is None or callable(number) else number for number in motion[: len(normal)]]
+    return abs(float(np.array(value) @ normal))
+
+
 @dataclass(frozen=True)
 @checked()
-class Support(Part):
+class Support(SupportPart):
     """Displacement prescribed on a surface, or at single nodes, component by component.
 
     Attributes:
@@ -96,6 +178,41 @@ class Support(Part):
         given = ("free" if v is None else "function" if callable(v) else f"{v:g}" for v in self.value)
         return f"{self.body} {self.surface} ({', '.join(given)})"
 
+    @property
+    def keeps(self) -> bool:
+        """Whether it holds something where it is when a load step begins."""
+        return any(isinstance(each, HoldCurrent) for each in self.value)
+
+    @property
+    def varies(self) -> bool:
+        """Whether it has components that are functions of position."""
+        return any(callable(component) for component in self.value)
+
+    def keeping(self, points: np.ndarray, moved: np.ndarray) -> Support:
+        """Return it with displacements of its nodes, (n, components), where it keeps them."""
+        pairs = zip(self.value, moved.T, strict=True)
+        value = (NodeValues(points, own) if isinstance(each, HoldCurrent) else each for each, own in pairs)
+        return replace(self, value=tuple(value))
+
+    def holds(self, components: int) -> np.ndarray:
+        """Return which components it holds, shape (components,)."""
+        return np.array([component is not None for component in self.value])
+
+    def motion_along(self, normal: np.ndarray, scene: Around) -> float:
+        """Return the largest displacement along a direction that it prescribes by numbers, [length]."""
+        return _along(self.value, normal)
+
+    def symmetry(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Return the axis of its only component, and the nodes of facets normal to it."""
+        mesh, dim = scene.bodies[self.body].mesh, scene.kinematics.dim
+        (axis, *others) = np.flatnonzero(self.holds(dim))
+        if others or callable(self.value[axis]) or axis >= dim or self.surface in mesh.node_sets:
+            return ()
+        facets = mesh.surfaces[self.surface]
+        areas = vector_areas(mesh.points, facets)
+        across = np.abs(areas[:, axis]) >= (1.0 - TILT) * np.linalg.norm(areas, axis=1)
+        return ((np.eye(dim)[axis], facets[across].ravel()),)
+
     def values(self, points: np.ndarray) -> np.ndarray:
         """Return the prescribed displacement, NaN where a component is free.
 
@@ -120,7 +237,7 @@ class Support(Part):
 
 @dataclass(frozen=True)
 @checked()
-class Roller(Part):
+class Roller(SupportPart):
     """A surface that slides: the displacement along its normal, or another direction, alone is prescribed.
 
     On a flat side it is a plane of symmetry, in whatever direction that lies: surfaces of contact that it
@@ -204,6 +321,55 @@ class Roller(Part):
             along = f"({', '.join(f'{part:.4g}' for part in self.direction)})"
         return f"{self.body} {self.surface} slides, {amount} along {along}"
 
+    @property
+    def rollers(self) -> tuple[Roller, ...]:
+        """Itself."""
+        return (self,)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether it holds its nodes where they are when a load step begins."""
+        return isinstance(self.displacement, HoldCurrent)
+
+    @property
+    def varies(self) -> bool:
+        """Whether its displacement is a function of position."""
+        return callable(self.displacement)
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Return what `amounts` returns."""
+        return self.amounts(points)
+
+    def holds(self, components: int) -> np.ndarray:
+        """Return which components it holds along the axes: none, its directions are others."""
+        return np.zeros(components, dtype=bool)
+
+    def held(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Return nothing: it holds along directions of its own, see `SceneParts.directions_of`."""
+        return ()
+
+    def largest_motion(self, scene: Around) -> float:
+        """Return the largest displacement that it prescribes, [length]."""
+        mesh = scene.bodies[self.body].mesh
+        return float(np.abs(self.amounts(mesh.points[self.nodes_in(mesh)])).max(initial=0.0))
+
+    def motion_along(self, normal: np.ndarray, scene: Around) -> float:
+        """Return the displacement along a direction that it prescribes by one number, [length]."""
+        along = self.direction_on(scene.bodies[self.body].mesh)
+        if along is None or callable(self.displacement):
+            return 0.0
+        return abs(self.displacement * float(along @ normal))
+
+    def symmetry(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Return the normal and the nodes of the flat side that it holds across, if it is one of symmetry."""
+        mesh = scene.bodies[self.body].mesh
+        normal, along = flat_normal(mesh, self.surface), self.direction_on(mesh)
+        if normal is None or along is None or callable(self.displacement):
+            return ()
+        if abs(along @ normal) < 1.0 - TILT or not scene.kinematics.is_mirrored(normal, TILT):
+            return ()
+        return ((normal, mesh.surfaces[self.surface].ravel()),)
+
     def amounts(self, points: np.ndarray) -> np.ndarray:
         """Return the prescribed displacement at points, shape (n, dim), along the direction there, (n,).
 
@@ -221,7 +387,7 @@ Motion: TypeAlias = tuple[float | None, ...]
 
 @dataclass(frozen=True)
 @checked()
-class RigidSurface(Part):
+class RigidSurface(SupportPart):
     """A surface that moves as one rigid piece: u = U + θ × (x − p), U and θ being the motion of a point p.
 
     Components of U and θ that are given are prescribed; the others follow from the equilibrium of the surface
@@ -386,6 +552,28 @@ class RigidSurface(Part):
         moved, turned = ", ".join(given[: self.dim]), ", ".join(given[self.dim :])
         return f"{self.body} {self.surface} as rigid: displacement ({moved}), rotation ({turned})"
 
+    @property
+    def rigid_surfaces(self) -> tuple[RigidSurface, ...]:
+        """Itself."""
+        return (self,)
+
+    def held(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Return its nodes, ascending, and their displacement by prescribed components, (n, components)."""
+        body = scene.bodies[self.body]
+        nodes = body.mesh.nodes_to_hold(self.surface)
+        points = body.mesh.points[nodes]
+        if body.deforms_much:
+            return ((nodes, self.turned(points, self.prescribed)),)
+        return ((nodes, self.values(points)),)
+
+    def motion_along(self, normal: np.ndarray, scene: Around) -> float:
+        """Return the displacement of its point along a direction that it prescribes, [length]."""
+        return _along(self.motion, normal)
+
+    def reference(self, scene: Around) -> np.ndarray:
+        """Return the point to which its reaction refers, shape (dim,)."""
+        return np.array(self.at)
+
     def modes(self, points: np.ndarray) -> np.ndarray:
         """Return the displacement of points for each unit component of U and θ.
 
@@ -452,7 +640,7 @@ TOOL = "tool"
 
 @dataclass(frozen=True)
 @checked()
-class ToolMotion(Part):
+class ToolMotion(SupportPart):
     """What moves a `RigidTool`: prescribed components, forces, moments and springs, for a support.
 
     Components of displacement and rotation that are given are prescribed; the others follow from equilibrium
@@ -491,12 +679,12 @@ class ToolMotion(Part):
     rotational_stiffness: GivenVector | float | None = None
 
     @property
-    def body(self) -> str:
+    def body(self) -> str:  # type: ignore[override]
         """The body that carries the motion of the tool in a scene."""
         return self.tool
 
     @property
-    def surface(self) -> str:
+    def surface(self) -> str:  # type: ignore[override]
         """The surface of that body."""
         return TOOL
 

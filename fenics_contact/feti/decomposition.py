@@ -21,7 +21,6 @@ from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, joined_axes, sa
 from fenics_contact._scene.memory import require_memory
 from fenics_contact._scene.revolution import hold_axis
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._scene.tools import with_tool_parts
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.following import dependent_nodes
@@ -206,10 +205,8 @@ def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalA
     along which axes.
     """
     prescribed = np.full((tearing.n_nodes, scene.components), np.nan)
-    for support in scene.supports:
-        if isinstance(support, Roller | ToolMotion):
-            continue
-        own, given = scene.given(support)
+    held = ((support, *each) for support in scene.supports for each in support.held(scene))
+    for support, own, given in held:
         nodes = tearing.global_nodes(support.body, own)
         known = prescribed[nodes]
         near = LAST_PLACES * np.nanmax(np.abs(given))

@@ -106,8 +106,9 @@ def _moving(columns: sp.csr_matrix, shape: tuple[int, ...]) -> np.ndarray:
 def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
     """Return the free motions of all rigid surfaces on the nodes of their bodies."""
     columns, loads, size = [], [], tearing.n_nodes * scene.components
-    for number, surface in enumerate(scene.supports):
-        if not isinstance(surface, RigidSurface) or not surface.free.any():
+    numbered = ((k, rigid) for k, each in enumerate(scene.supports) for rigid in each.rigid_surfaces)
+    for number, surface in numbered:
+        if not surface.free.any():
             continue
         mesh = scene.bodies[surface.body].mesh
         own = mesh.nodes_to_hold(surface.surface)

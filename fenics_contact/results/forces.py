@@ -16,7 +16,7 @@ from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.pairs import ContactPair, Surface, named
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
-from fenics_contact._scene.supports import RigidSurface, Roller, Support
+from fenics_contact._scene.supports import RigidSurface, Roller
 from fenics_contact._surfaces.facets import share_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_sum
@@ -341,13 +341,12 @@ def support_reactions(
     entries = []
     for support, share in zip(scene.supports, shares, strict=True):
         surface = Surface(support.body, support.surface)
-        own = np.array(support.at) if isinstance(support, RigidSurface) else centroid(scene, surface)
-        point = own if about is None else point_of(about, scene.dim)
+        point = support.reference(scene) if about is None else point_of(about, scene.dim)
         total = resultant(share.of(forces.reaction), forces.places, point, scene.kinematics, surface)
-        if isinstance(support, RigidSurface):
-            if (spring := forces.spring(support, point)) is not None:
+        for rigid in support.rigid_surfaces:
+            if (spring := forces.spring(rigid, point)) is not None:
                 total = total - spring
-            total = total - forces.point_load(support, point, scene.kinematics)
+            total = total - forces.point_load(rigid, point, scene.kinematics)
             if support.body in _uncarried(torn):
                 total = on_tool(torn, forces, support.body, point)
                 total = Resultant(-total.force, -total.moment, point, surface)
@@ -413,7 +412,7 @@ def support_shares(scene: Scene, numbers: NodeNumbers) -> list[SupportShare]:
     one.
     """
     areas, count = [], numbers.n_nodes
-    held = [(number, each) for number, each in enumerate(scene.supports) if isinstance(each, Roller)]
+    held = ((number, roller) for number, each in enumerate(scene.supports) for roller in each.rollers)
     rolled = {number: _rolled(scene, roller, numbers) for number, roller in held}
     nodes = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(n for n, _ in rolled.values())]))
     squares = np.zeros((len(scene.supports), len(nodes), scene.components, scene.components))
@@ -422,17 +421,12 @@ def support_shares(scene: Scene, numbers: NodeNumbers) -> list[SupportShare]:
         own = np.zeros(count)
         every = numbers.global_nodes(support.body, np.arange(mesh.n_nodes))
         own[every] = share_areas(mesh, support.surface)
-        if isinstance(support, Roller):
-            place = np.searchsorted(nodes, rolled[number][0])
-            along = rolled[number][1]
-            np.add.at(squares[number], place, along[:, :, None] * along[:, None, :])
-            squares[number] *= own[nodes, None, None]
-            areas.append(np.zeros((count, scene.components)))
-            continue
-        given = support.value if isinstance(support, Support) else (0.0,) * scene.components
-        components = [component is not None for component in given]
-        areas.append(own[:, None] * components)
+        areas.append(own[:, None] * support.holds(scene.components))
         squares[number] = areas[-1][nodes][:, :, None] * np.eye(scene.components)
+        if number in rolled:
+            held_at, along = rolled[number]
+            np.add.at(squares[number], np.searchsorted(nodes, held_at), along[:, :, None] * along[:, None, :])
+            squares[number] *= own[nodes, None, None]
     total = sum(areas, np.zeros((count, scene.components)))
     parts = [area / np.where(total > 0.0, total, 1.0) for area in areas]
     inverse = np.linalg.pinv(squares.sum(axis=0), rcond=1e-10, hermitian=True)
@@ -534,14 +528,13 @@ def force_balance(
         name: resultant(force * kinematics.balanced, forces.places, point, kinematics)
         for name, force in parts.items()
     }
-    for support in torn.scene.supports:
-        if isinstance(support, RigidSurface):  # the load at its point comes in through its nodes
-            load, spring = forces.point_load(support, point, kinematics), forces.spring(support, point)
-            resultants["loads"] += load
-            resultants["reactions"] -= load
-            if spring is not None:
-                resultants["beds"] += spring
-                resultants["reactions"] -= spring
+    for rigid in torn.scene.rigid_surfaces:  # the load at its point comes in through its nodes
+        load, spring = forces.point_load(rigid, point, kinematics), forces.spring(rigid, point)
+        resultants["loads"] += load
+        resultants["reactions"] -= load
+        if spring is not None:
+            resultants["beds"] += spring
+            resultants["reactions"] -= spring
     arms = kinematics.arms(forces.places, point)
     sizes = [np.linalg.norm(force, axis=1) for force in parts.values()]
     reach = np.linalg.norm(arms, axis=1)

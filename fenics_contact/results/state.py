@@ -18,7 +18,6 @@ from fenics_contact._fem.forms import temperature_of
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.errors import InvalidInputError, collectively
 from fenics_contact.feti.averages import nodal_mean
 from fenics_contact.feti.direct import DirectSolution
@@ -486,13 +485,12 @@ class State(ABC):
 
         Collective.
         """
-        rigid = [support for support in self.scene.supports if isinstance(support, RigidSurface)]
         known = self._known_motions
         return tuple(
             rigid_motion(
                 self.scene, each, self.gather_displacement(each.body), known.get((each.body, each.surface))
             )
-            for each in rigid
+            for each in self.scene.rigid_surfaces
         )
 
     @property
