@@ -203,7 +203,7 @@ class InsideOf:
         slave, values = self.slave, facet_shape_values(local, self.slave.corners)
         at_corners = slave.facets[facet]
         normal, _ = interpolated_normal(values, slave.normals[at_corners])
-        nodes, weights = (at_corners, values) if slave.whole is None else shape_weights(slave, facet, values)
+        nodes, weights = shape_weights(slave, facet, values)
         if slave.relief is None:
             place = np.einsum("nk,nkd->nd", weights, slave.points[nodes])
         else:
@@ -253,8 +253,7 @@ class InsideOf:
         `gaps_at`: gaps at points of facets.
         """
         slave, values = self.slave, facet_shape_values(local, self.slave.corners)
-        at_corners = slave.facets[facet]
-        nodes, weights = (at_corners, values) if slave.whole is None else shape_weights(slave, facet, values)
+        nodes, weights = shape_weights(slave, facet, values)
         needed, place = np.unique(nodes, return_inverse=True)
         at_nodes = gaps_at(*self.at_nodes(needed))[place.reshape(nodes.shape)]
         between = np.einsum("nk,nk->n", weights, np.where(weights != 0.0, at_nodes, 0.0))

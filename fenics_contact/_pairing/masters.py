@@ -437,8 +437,7 @@ def _by_mortar(slave: Slave, master: BodyMaster, search: Search) -> ContactPoint
     from fenics_contact._pairing.mortar.points import MortarPoints
 
     # Of linear facets only what supports hold: a hanging node, say, moves and keeps its function.
-    whole = slave.surface.whole is None
-    free = ~search.fixed[slave.nodes].all(axis=1) if whole else slave.bearing
+    free = slave.bearing if slave.surface.cut.is_cut else ~search.fixed[slave.nodes].all(axis=1)
     share = master_share(search.scene, master.pair)
     met = MortarPoints.of(slave.surface, master.surface, slave.bearing, share, search.comm, free)
     coupling, nodes = met.coupling, np.concatenate([slave.nodes, master.nodes])

@@ -16,7 +16,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._kinematics.measure import PLAIN, Measure
-from fenics_contact._surfaces.mixed_pieces import MixedPieces
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import FACET_TYPES, quadrature, shape_gradients, shape_values
@@ -278,6 +277,55 @@ class Relief:
     offsets: np.ndarray | None = None
 
 
+class Uncut:
+    """Facets that are whole, on which displacements have the linear functions of their corners."""
+
+    #: Degree of displacements.
+    order = 1
+    #: Degree of the quadrature with which mortar integrals are exact enough.
+    degree = 5
+    #: Whether these are pieces of facets, and of facets of several shapes.
+    is_cut = is_mixed = False
+
+    def whole_of(self, facets: np.ndarray) -> np.ndarray:
+        """Return the facets before they were cut."""
+        return facets
+
+    def nodes(self, facets: np.ndarray, facet: np.ndarray) -> np.ndarray:
+        """Return the nodes whose displacements move facets, shape (n, nodes)."""
+        return np.asarray(facets[facet])
+
+    def functions(self, facet: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return the shape functions of displacements at points of facets, shape (n, ..., nodes).
+
+        `facet`: facet of each group of points, shape (n,); `values`: linear ones, shape (n, ..., corners).
+        """
+        return values
+
+    def gradients(self, facet: np.ndarray, values: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        """Return their derivatives by local coordinates, from those of the linear ones, one point a facet."""
+        return gradients
+
+    def pulled_back(self, facet: np.ndarray, values: np.ndarray, by: np.ndarray) -> np.ndarray:
+        """Vector-Jacobian product of `functions` with respect to the linear ones, in their shape."""
+        return by
+
+    def mean_nodes(self, facets: np.ndarray, facet: np.ndarray) -> np.ndarray:
+        """Return the nodes in the means of slaves, none where these are nodes, shape (n, nodes)."""
+        return np.zeros((len(facet), 0), dtype=np.int64)
+
+    def mean_functions(self, facet: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return the shape functions in these means, see `functions`."""
+        return np.zeros((*values.shape[:-1], 0))
+
+    def means_pulled_back(self, facet: np.ndarray, values: np.ndarray, by: np.ndarray) -> np.ndarray:
+        """Vector-Jacobian product of `mean_functions`, see `pulled_back`."""
+        return np.zeros_like(values)
+
+
+UNCUT = Uncut()
+
+
 @dataclass(frozen=True)
 class FacetedSurface:
     """Facets with unit nodal normals and, if known, the true surface that they approximate.
@@ -295,16 +343,13 @@ class FacetedSurface:
         mirrored: On which planes of symmetry the nodes lie, across which the normals have no component: a
             column for each plane, those normal to the axes first, shape (n, n_planes).
         relief: The true surface relative to the facets; None if it is unknown or coincides with them.
-        whole: The facets that were cut into these, as rows of positions in ``nodes``, quadratic ones, or
-            triangles and quadrilaterals together; None if they are whole.
+        cut: How these facets are pieces of quadratic ones, or of triangles and quadrilaterals together.
         measure: What is a length or an area.
         planes: Unit normals of the planes of symmetry, the axes first, shape (n_planes, dim).
         followed: What makes values at hanging nodes the means of their masters', shape (n, n); None without
             any.
         by_pieces: Whether the areas of nodes are those of the linear pieces around them, all of them
             positive, as of slaves of mortar contact.
-        mixed: How these facets, all triangles, are pieces of triangles and quadrilaterals; None where all
-            are alike.
         sharp: Area that has to face the master for a node on a corner or an edge of the body to have its
             normal, infinite elsewhere, shape (n,), of slaves of mortar contact; None: infinite everywhere.
     """
@@ -317,11 +362,10 @@ class FacetedSurface:
     mirrored: np.ndarray
     planes: np.ndarray
     relief: Relief | None = None
-    whole: np.ndarray | None = None
+    cut: Uncut = UNCUT
     measure: Measure = PLAIN
     followed: sp.csr_matrix | None = None
     by_pieces: bool = False
-    mixed: MixedPieces | None = None
     sharp: np.ndarray | None = None
 
     def within(self, vectors: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
@@ -348,7 +392,7 @@ class FacetedSurface:
     @property
     def order(self) -> int:
         """Degree of the facets of the body: 1 or 2."""
-        return 1 if self.whole is None or self.whole.shape[1] == 4 else 2
+        return self.cut.order
 
     @property
     def dim(self) -> int:
@@ -358,11 +402,16 @@ class FacetedSurface:
     @property
     def bearing(self) -> np.ndarray:
         """The facets whose areas belong to nodes, quadratic ones or linear pieces, (n_facets, nodes)."""
-        return self.facets if self.whole is None or self.by_pieces else self.whole
+        return self.facets if self.by_pieces else self.whole
+
+    @property
+    def whole(self) -> np.ndarray:
+        """The facets before they were cut, as rows of positions in ``nodes``, (n_facets, nodes)."""
+        return self.cut.whole_of(self.facets)
 
     def with_areas_of_pieces(self) -> FacetedSurface:
         """Return the surface with the areas that belong to nodes as a slave of mortar contact."""
-        if self.whole is None:
+        if not self.cut.is_cut:
             return self
         surface = replace(self, by_pieces=True)
         return replace(surface, areas=surface.areas_at(self.points))

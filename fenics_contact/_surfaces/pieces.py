@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact._surfaces.facets import FacetedSurface, shape_functions
+from fenics_contact._surfaces.facets import FacetedSurface, Uncut, shape_functions
 from fenics_contact.mesh.cell_types import FACET_TYPES, CellType, shape_gradients, shape_values
 from fenics_contact.mesh.faces import TRIANGLE_COLUMNS, is_triangle
-from fenics_contact.mesh.linear_facets import HALVES
+from fenics_contact.mesh.linear_facets import HALVES, LinearFacets
 
 
 def local_coordinates(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
@@ -69,27 +69,6 @@ class _Places:
     local: np.ndarray
     arms: np.ndarray
 
-    @classmethod
-    def of(cls, surface: FacetedSurface, facet: np.ndarray, weights: np.ndarray) -> Iterator[_Places]:
-        """Yield the points on facets of each shape; arguments as of `shape_weights`."""
-        whole, mixed, dim = surface.whole, surface.mixed, surface.dim
-        assert whole is not None
-        width = whole.shape[1]
-        every = list(range(width))
-        if mixed is None:
-            kind = FACET_TYPES[width, dim]
-            yield cls(slice(None), every, kind, *_linear(kind, facet % len(kind.pieces), weights))
-            return
-        triangles, number = is_triangle(whole)[mixed.owner[facet]], mixed.number[facet]
-        columns = TRIANGLE_COLUMNS[width]
-        for mine, own in ((np.flatnonzero(triangles), columns), (np.flatnonzero(~triangles), every)):
-            kind = FACET_TYPES[len(own), dim]
-            if own is columns:
-                found = _linear(kind, number[mine], weights[mine])
-            else:
-                found = _halved(kind, number[mine], mixed.flat[facet[mine]], weights[mine])
-            yield cls(mine, own, kind, *found)
-
 
 def _linear(kind: CellType, piece: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return reference coordinates and their arms where they are linear in pieces."""
@@ -110,27 +89,121 @@ def _halved(
     return np.einsum("mk,mkd->md", values, whole), corners @ turned
 
 
-def whole_nodes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
-    """Return the nodes of the whole facets that pieces belong to, shape (m, nodes of a facet)."""
-    assert surface.whole is not None
-    if surface.mixed is not None:
-        return np.asarray(surface.whole[surface.mixed.owner[facet]])
-    return np.asarray(surface.whole[facet // (len(surface.facets) // len(surface.whole))])
+@dataclass(frozen=True, eq=False)
+class Pieces(Uncut):
+    """How linear facets are pieces of facets of one shape.
 
-
-def shape_weights(
-    surface: FacetedSurface, facet: np.ndarray, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes of whole facets and their weights at points of linear pieces.
-
-    Returns node numbers and shape functions of the whole facets, (m, nodes of a facet) each; of triangles
-    among quadrilaterals those of nodes that are listed again are zero.
+    Attributes:
+        whole: The facets, as rows of positions in the nodes of the surface, shape (n_facets, nodes).
+        dim: Dimension of the space around them.
     """
-    nodes = whole_nodes(surface, facet)
-    values = np.zeros(nodes.shape)
-    for at in _Places.of(surface, facet, weights):
-        _put(values, at, shape_values(at.kind, at.local))
-    return nodes, values
+
+    whole: np.ndarray
+    dim: int
+
+    is_cut = True
+
+    @property
+    def order(self) -> int:  # type: ignore[override]
+        """Degree of displacements."""
+        return 1 if self.whole.shape[1] == 4 else 2
+
+    @property
+    def degree(self) -> int:  # type: ignore[override]
+        """Degree of quadrature, higher on quadratic quadrilaterals and halves of any."""
+        return 8 if self.whole.shape[1] in (4, 9) else 5
+
+    def whole_of(self, facets: np.ndarray) -> np.ndarray:
+        """Return the facets."""
+        return self.whole
+
+    def _owner(self, facet: np.ndarray) -> np.ndarray:
+        """Return the facets that pieces belong to."""
+        return np.asarray(facet // len(FACET_TYPES[self.whole.shape[1], self.dim].pieces))
+
+    def _places(self, facet: np.ndarray, weights: np.ndarray) -> Iterator[_Places]:
+        """Yield the points on facets of each shape; arguments as of `functions`, one point a piece."""
+        width = self.whole.shape[1]
+        kind = FACET_TYPES[width, self.dim]
+        yield _Places(
+            slice(None), list(range(width)), kind, *_linear(kind, facet % len(kind.pieces), weights)
+        )
+
+    def nodes(self, facets: np.ndarray, facet: np.ndarray) -> np.ndarray:
+        """Return the nodes of the whole facets; triangles among quadrilaterals list some again."""
+        return np.asarray(self.whole[self._owner(facet)])
+
+    def functions(self, facet: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return the shape functions of the whole facets; those of nodes that are listed again are zero."""
+        shape, width = values.shape[:-1], self.whole.shape[1]
+        values, facet = values.reshape(-1, values.shape[-1]), _each(facet, shape)
+        result = np.zeros((len(values), width))
+        for at in self._places(facet, values):
+            _put(result, at, shape_values(at.kind, at.local))
+        return result.reshape(*shape, width)
+
+    def gradients(self, facet: np.ndarray, values: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        """Return the derivatives of `functions` by the pieces' local coordinates."""
+        result = np.zeros((len(facet), self.whole.shape[1], gradients.shape[2]))
+        for at in self._places(facet, values):
+            by_local = np.einsum("mka,mkd->mda", gradients[at.points], at.arms)
+            _put(result, at, shape_gradients(at.kind, at.local) @ by_local)
+        return result
+
+    def pulled_back(self, facet: np.ndarray, values: np.ndarray, by: np.ndarray) -> np.ndarray:
+        """Vector-Jacobian product of `functions` with respect to the linear ones."""
+        shape, facet = values.shape, _each(facet, values.shape[:-1])
+        values, by = values.reshape(-1, shape[-1]), by.reshape(-1, by.shape[-1])
+        result = np.zeros(values.shape)
+        for at in self._places(facet, values):
+            gradients = shape_gradients(at.kind, at.local)
+            by_local = np.einsum("mj,mjd->md", by[at.points][:, at.columns], gradients)
+            result[at.points] = np.einsum("md,mkd->mk", by_local, at.arms)
+        return result.reshape(shape)
+
+    mean_nodes, mean_functions, means_pulled_back = nodes, functions, pulled_back
+
+
+@dataclass(frozen=True, eq=False)
+class MixedPieces(Pieces):
+    """How triangles are pieces of triangles and quadrilaterals of one surface.
+
+    `owner`, `number`: whose piece each is, and which, see `LinearFacets`; `flat`: corners of the linear
+    quadrilateral that it is half of, in the mean plane of this, relative to its middle; zero for triangles.
+    """
+
+    owner: np.ndarray
+    number: np.ndarray
+    flat: np.ndarray
+
+    is_mixed = True
+
+    @classmethod
+    def of(cls, points: np.ndarray, whole: np.ndarray, cut: LinearFacets) -> MixedPieces:
+        """Return those of facets."""
+        halved = ~is_triangle(whole)[cut.owner]
+        kind, flat = FACET_TYPES[whole.shape[1], 3], np.zeros((len(cut.owner), 4, 2))
+        corners = kind.pieces[cut.number[halved] // 2]
+        flat[halved] = _laid_flat(points[np.take_along_axis(whole[cut.owner[halved]], corners, axis=1)])
+        return cls(whole, 3, cut.owner, cut.number, flat)
+
+    def _owner(self, facet: np.ndarray) -> np.ndarray:
+        return np.asarray(self.owner[facet])
+
+    def _places(self, facet: np.ndarray, weights: np.ndarray) -> Iterator[_Places]:
+        width, triangles = self.whole.shape[1], is_triangle(self.whole)[self.owner[facet]]
+        columns, number = TRIANGLE_COLUMNS[width], self.number[facet]
+        mine = np.flatnonzero(triangles)
+        kind = FACET_TYPES[len(columns), self.dim]
+        yield _Places(mine, columns, kind, *_linear(kind, number[mine], weights[mine]))
+        mine = np.flatnonzero(~triangles)
+        kind, flat = FACET_TYPES[width, self.dim], self.flat[facet[mine]]
+        yield _Places(mine, list(range(width)), kind, *_halved(kind, number[mine], flat, weights[mine]))
+
+
+def _each(facet: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return the facet of each of the points of groups of a shape, (n, ...)."""
+    return facet if len(shape) == 1 else np.repeat(facet, shape[1])
 
 
 def _put(result: np.ndarray, at: _Places, values: np.ndarray) -> None:
@@ -139,25 +212,19 @@ def _put(result: np.ndarray, at: _Places, values: np.ndarray) -> None:
     result[rows[:, None], np.array(at.columns)] = values
 
 
-def shape_weight_gradients(
-    surface: FacetedSurface, facet: np.ndarray, weights: np.ndarray, gradients: np.ndarray
-) -> np.ndarray:
-    """Return the derivatives of the weights that `shape_weights` returns by the pieces' local coordinates."""
-    assert surface.whole is not None
-    result = np.zeros((len(facet), surface.whole.shape[1], gradients.shape[2]))
-    for at in _Places.of(surface, facet, weights):
-        by_local = np.einsum("mka,mkd->mda", gradients[at.points], at.arms)
-        _put(result, at, shape_gradients(at.kind, at.local) @ by_local)
-    return result
+def _laid_flat(corners: np.ndarray) -> np.ndarray:
+    """Return quadrilaterals, (n, 4, 3), in their mean planes relative to their middles, (n, 4, 2)."""
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    along = corners[:, 1] - corners[:, 0]
+    along -= np.einsum("nd,nd->n", along, normal)[:, None] * normal
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    away = corners - corners.mean(axis=1, keepdims=True)
+    return np.asarray(away @ np.stack([along, np.cross(normal, along)], axis=2))
 
 
-def shape_weights_pulled_back(
-    surface: FacetedSurface, facet: np.ndarray, weights: np.ndarray, by: np.ndarray
-) -> np.ndarray:
-    """Vector-Jacobian product of the functions that `shape_weights` returns with respect to ``weights``."""
-    result = np.zeros(weights.shape)
-    for at in _Places.of(surface, facet, weights):
-        gradients = shape_gradients(at.kind, at.local)
-        by_local = np.einsum("mj,mjd->md", by[at.points][:, at.columns], gradients)
-        result[at.points] = np.einsum("md,mkd->mk", by_local, at.arms)
-    return result
+def shape_weights(
+    surface: FacetedSurface, facet: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes that move points of facets and their weights, shape (n, nodes) each."""
+    return surface.cut.nodes(surface.facets, facet), surface.cut.functions(facet, weights)

@@ -52,9 +52,7 @@ _EACH = ("point", "facet", "local", "gap", "normal", "beside")
 def node_weights(surface: FacetedSurface, hit: Projection) -> sp.csr_matrix:
     """Return the weights of nodes in the motion of a surface at projections, shape (n, n_nodes)."""
     values, _ = shape_functions(hit.local, surface.corners)
-    nodes = surface.facets[hit.facet]
-    if surface.whole is not None:
-        nodes, values = shape_weights(surface, hit.facet, values)
+    nodes, values = shape_weights(surface, hit.facet, values)
     row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
     return sp.csr_matrix((values.ravel(), (row, nodes.ravel())), shape=(len(nodes), len(surface.nodes)))
 
@@ -250,9 +248,9 @@ def surfaces_match(
 
 def _matched_facets(*surfaces: FacetedSurface) -> list[np.ndarray]:
     """Return the facets of surfaces, whole ones where those of some are of several shapes."""
-    if all(surface.mixed is None for surface in surfaces):
+    if not any(surface.cut.is_mixed for surface in surfaces):
         return [surface.facets for surface in surfaces]
-    facets = [surface.facets if surface.whole is None else surface.whole for surface in surfaces]
+    facets = [surface.whole for surface in surfaces]
     width = max(each.shape[1] for each in facets)
     return [widened(each, width) if (each.shape[1], width) in ((3, 4), (6, 9)) else each for each in facets]
 

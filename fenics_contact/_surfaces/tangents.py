@@ -15,7 +15,7 @@ from fenics_contact._surfaces.facets import (
     shape_functions,
 )
 from fenics_contact._surfaces.fitting import PolynomialFit
-from fenics_contact._surfaces.pieces import shape_weight_gradients, shape_weights
+from fenics_contact._surfaces.pieces import shape_weights
 from fenics_contact._surfaces.true_surface import Wedges, wedges_of
 from fenics_contact.shapes.simple import tangent_bases
 
@@ -108,7 +108,7 @@ def _mean_derivatives(surface: FacetedSurface, wedges: Wedges, axes: np.ndarray)
     facet, at = np.repeat(np.arange(count), corners), wedges.of_corner.ravel()
     shares, slopes = np.tile(np.eye(corners), (count, 1)), np.tile(slopes, (count, 1, 1))
     nodes, _ = shape_weights(surface, facet, shares)
-    slopes = shape_weight_gradients(surface, facet, shares, slopes)
+    slopes = surface.cut.gradients(facet, shares, slopes)
     by_local = np.einsum("mqa,mqd->mda", slopes, surface.points[nodes])
     by_axes = np.linalg.inv(axes[at, :width] @ by_local)
     values = np.swapaxes(slopes @ by_axes, 1, 2) / np.bincount(at)[at][:, None, None]

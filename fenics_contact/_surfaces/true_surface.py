@@ -23,7 +23,7 @@ from fenics_contact._surfaces.facets import (
     slopes,
 )
 from fenics_contact._surfaces.fitting import PolynomialFit, powers_of
-from fenics_contact._surfaces.mixed_pieces import MixedPieces
+from fenics_contact._surfaces.pieces import MixedPieces, Pieces
 from fenics_contact._surfaces.projection import interpolated_normal
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -373,11 +373,11 @@ def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str, measure: Mea
     if mesh.order == 1 and not (measure.varies or both):
         return surface
     whole = np.searchsorted(surface.nodes, facets)
-    if mesh.order > 1 or both:
-        surface = replace(surface, whole=whole)
     if both:
-        mixed = MixedPieces.of(surface.points, whole, linear_facets(facets, mesh.dim))
-        surface = replace(surface, mixed=mixed)
+        cut = MixedPieces.of(surface.points, whole, linear_facets(facets, mesh.dim))
+        surface = replace(surface, cut=cut)
+    elif mesh.order > 1:
+        surface = replace(surface, cut=Pieces(whole, mesh.dim))
     surface = replace(surface, measure=measure)
     return replace(surface, areas=surface.areas_at(surface.points))
 

@@ -21,7 +21,6 @@ from fenics_contact._surfaces.facets import (
     shape_functions,
     slopes,
 )
-from fenics_contact._surfaces.pieces import shape_weight_gradients, shape_weights
 from fenics_contact._surfaces.projection import interpolated_normal, newton_matrix
 from fenics_contact.mesh.faces import of_one_shape
 
@@ -240,10 +239,7 @@ def carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> t
     Returns positions among the surface's nodes, shape (n, nodes), and gradients, shape (n, nodes, dim − 1).
     """
     values, gradients = shape_functions(local, surface.corners)
-    if surface.whole is None:
-        return surface.facets[facet], gradients
-    nodes, _ = shape_weights(surface, facet, values)
-    return nodes, shape_weight_gradients(surface, facet, values, gradients)
+    return surface.cut.nodes(surface.facets, facet), surface.cut.gradients(facet, values, gradients)
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:

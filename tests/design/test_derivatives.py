@@ -469,7 +469,7 @@ def in_touch(kind: str, cells: int, radius: float, *, convex: bool) -> FacetedSu
 
 
 def placed(surface: FacetedSurface, points: np.ndarray, mirrored: np.ndarray) -> FacetedSurface:
-    plain = replace(faceted_surface(points, surface.facets, mirrored), whole=surface.whole)
+    plain = replace(faceted_surface(points, surface.facets, mirrored), cut=surface.cut)
     return plain.with_areas_of_pieces()
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
+from fenics_contact._surfaces.pieces import Pieces
 from fenics_contact.mesh.cell_types import FACET_TYPES
 
 #: Facets of the slave and of the master.
@@ -51,7 +52,7 @@ def quadratic_surface(points: np.ndarray, corners: np.ndarray) -> FacetedSurface
     whole = np.concatenate([corners, *more], axis=1)
     pieces = FACET_TYPES[whole.shape[1], points.shape[1]].pieces
     surface = faceted_surface(points, whole[:, pieces].reshape(-1, count))
-    return replace(surface, whole=whole).with_areas_of_pieces()
+    return replace(surface, cut=Pieces(whole, points.shape[1])).with_areas_of_pieces()
 
 
 def _facets(number: np.ndarray, kind: str, outward: bool) -> np.ndarray:

@@ -22,7 +22,7 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact._surfaces.facets import quadrature_areas, shape_functions
-from fenics_contact._surfaces.pieces import shape_weight_gradients, shape_weights, shape_weights_pulled_back
+from fenics_contact._surfaces.pieces import shape_weights
 from fenics_contact._surfaces.true_surface import true_surface
 from fenics_contact.materials import IsotropicElasticity, NeoHooke
 from fenics_contact.mesh import quadratic
@@ -140,7 +140,7 @@ def test_functions_on_pieces_are_those_of_whole_facets(make) -> None:  # type: i
     mesh: BodyMesh = make(wavy(mixed_bar()))
     surface = true_surface(mesh, "z1", "faceted")
     assert surface.corners == 3
-    assert surface.mixed is not None
+    assert surface.cut.is_mixed
     assert surface.areas.sum() == pytest.approx(2.0, rel=1e-12)
     facet = np.repeat(np.arange(len(surface.facets)), 3)
     local = np.random.default_rng(0).uniform(0.1, 0.4, (len(facet), 2))
@@ -149,13 +149,13 @@ def test_functions_on_pieces_are_those_of_whole_facets(make) -> None:  # type: i
     place = np.einsum("mk,mkd->md", values, surface.points[surface.facets[facet]])
     np.testing.assert_allclose(np.einsum("mk,mkd->md", weights, surface.points[nodes]), place, atol=1e-13)
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-13)
-    gradients, step = shape_weight_gradients(surface, facet, values, slopes), 1e-6
+    gradients, step = surface.cut.gradients(facet, values, slopes), 1e-6
     for axis in range(2):
         ends = [shape_functions(local + way * step * np.eye(2)[axis], 3)[0] for way in (1, -1)]
         high, low = (shape_weights(surface, facet, end)[1] for end in ends)
         np.testing.assert_allclose(gradients[:, :, axis], (high - low) / (2 * step), atol=1e-8)
     by = np.random.default_rng(1).uniform(-1, 1, weights.shape)
-    pulled = shape_weights_pulled_back(surface, facet, values, by)
+    pulled = surface.cut.pulled_back(facet, values, by)
     np.testing.assert_allclose(
         np.einsum("mk,mka->ma", pulled, slopes), np.einsum("mj,mja->ma", by, gradients), atol=1e-10
     )

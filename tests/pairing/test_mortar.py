@@ -106,7 +106,7 @@ curved = pytest.mark.parametrize(("slave_kind", "master_kind"), CURVED)
 
 def pressed_by_one(surface: FacetedSurface) -> np.ndarray:
     """Nodal forces of a unit pressure."""
-    facets = surface.facets if surface.whole is None else surface.whole
+    facets = surface.whole
     areas = nodal_areas(surface.points, facets)
     return np.bincount(facets.ravel(), areas.ravel(), minlength=len(surface.points))
 

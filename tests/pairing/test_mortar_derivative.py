@@ -40,7 +40,7 @@ def warped(surface: FacetedSurface, size: float, seed: int) -> FacetedSurface:
 def placed(surface: FacetedSurface, points: np.ndarray) -> FacetedSurface:
     """A surface with its nodes elsewhere, without what lay over it."""
     plain = faceted_surface(points, surface.facets, surface.mirrored)
-    plain = replace(plain, whole=surface.whole, sharp=surface.sharp)
+    plain = replace(plain, cut=surface.cut, sharp=surface.sharp)
     return plain.with_areas_of_pieces()
 
 
@@ -147,7 +147,7 @@ def scalar(slave: FacetedSurface, master: FacetedSurface, here: Setting, by: Cou
     found = mortar_coupling(slave, master)
     assert np.array_equal(found.node, here.coupling.node)
     means = found.weight @ by.right
-    if slave.whole is not None:
+    if slave.cut.is_cut:
         means = means - found.of_slave(by.own)
     weights = np.einsum("nr,nr->", by.left, means)
     return float(by.area @ found.area + weights + np.sum(by.normal * found.normal) + by.gap @ found.gap)

@@ -44,7 +44,7 @@ MUTATIONS = (
     Mutation(
         "quadratic slaves move in mortar contact as their nodes do",
         "_pairing/mortar/coupling.py",
-        "None if slave.whole is None else _scaled(means[node])",
+        "_scaled(means[node]) if slave.cut.is_cut else None",
         "None",
         ("tests/pairing/test_quadratic_mortar.py::test_a_uniform_pressure_passes_between_edges",),
     ),

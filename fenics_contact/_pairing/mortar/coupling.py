@@ -33,7 +33,7 @@ from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.mortar.cells import Cells, candidate_pairs, cells_of, overlaps_of
 from fenics_contact._pairing.mortar.normals import normals_at
 from fenics_contact._pairing.mortar.planes import SumsBy, check_convex, planes_of
-from fenics_contact._pairing.mortar.traces import Traces, trace_functions, trace_nodes
+from fenics_contact._pairing.mortar.traces import Traces
 from fenics_contact._surfaces.facets import FacetedSurface, heights
 from fenics_contact._surfaces.projection import interpolated_normal
 from fenics_contact.errors import InvalidInputError, together
@@ -207,15 +207,14 @@ def _heights_along(
     """Return heights along a direction whose angle to the normal is less than a facet's turn."""
     if surface.relief is None:
         return np.zeros(local.shape[:2])
-    if surface.whole is not None:
-        bulge = bulges_along(surface, facet, values, direction)
+    bulge = bulges_along(surface, facet, values, direction) if surface.cut.is_cut else 0.0
     points = local.shape[1]
     facet, direction = np.repeat(facet, points), np.repeat(direction, points, axis=0)
     values = values.reshape(len(facet), values.shape[-1])
     normal, _ = interpolated_normal(values, surface.normals[surface.facets[facet]])
     height = heights(surface, facet, local.reshape(len(facet), local.shape[-1])).value
     raised = np.asarray(height / np.einsum("nd,nd->n", normal, direction)).reshape(local.shape[:2])
-    return raised if surface.whole is None else raised - bulge
+    return np.asarray(raised - bulge)
 
 
 def bulges_along(
@@ -226,10 +225,10 @@ def bulges_along(
     `facet`: piece of each group of points, shape (n,); `values`: its shape functions, shape (n, q, corners);
     `direction`: shape (n, dim).
     """
-    curved = trace_functions(surface, facet, values)
+    curved = surface.cut.functions(facet, values)
     along, straight = (
         np.einsum("nkd,nd->nk", surface.points[nodes], direction)
-        for nodes in (trace_nodes(surface, facet), surface.facets[facet])
+        for nodes in (surface.cut.nodes(surface.facets, facet), surface.facets[facet])
     )
     return np.asarray(np.einsum("nqk,nk->nq", curved, along) - np.einsum("nqk,nk->nq", values, straight))
 
@@ -342,7 +341,7 @@ def _coupling(
     `least_share`: fraction of a node's area that must face the master for the node to carry a multiplier.
     """
     node = np.flatnonzero(area > least_share * slave.areas)
-    weight, own = _scaled(integrals[node]), None if slave.whole is None else _scaled(means[node])
+    weight, own = _scaled(integrals[node]), _scaled(means[node]) if slave.cut.is_cut else None
     normal = normals_at(slave, master, node, weight, area[node])
     raised = relief[node] / area[node, None]
     coupling = MortarCoupling(node, area[node], weight, normal, raised, np.zeros(len(node)), own)
@@ -364,8 +363,7 @@ def degree_on(slave: FacetedSurface, master: FacetedSurface) -> int:
     quadrilaterals they are no polynomials in the plane: a uniform pressure misses the nodal forces by up to
     9e-8 with degree 5, 2e-10 with 6 and 5e-13 with 8.
     """
-    sides = (side.whole for side in (slave, master) if side.whole is not None)
-    return 8 if any(whole.shape[1] in (4, 9) for whole in sides) else 5
+    return max(slave.cut.degree, master.cut.degree)
 
 
 def _integrals(

@@ -34,9 +34,6 @@ from fenics_contact._pairing.mortar.jacobians import MomentSlopes, NumbersOver, 
 from fenics_contact._pairing.mortar.planes import Planes, SumsBy, planes_of, planes_pulled_back
 from fenics_contact._pairing.mortar.traces import (
     Traces,
-    trace_functions,
-    trace_functions_pulled_back,
-    trace_nodes,
 )
 from fenics_contact._surfaces.facets import FacetedSurface, heights
 from fenics_contact._surfaces.projection import interpolated_normal
@@ -216,15 +213,14 @@ def _bulges_pulled_back(
     into: SurfaceDerivatives,
 ) -> tuple[np.ndarray, np.ndarray] | tuple[float, float]:
     """Return the derivatives of `bulges_along` at points by linear shape functions and directions."""
-    if surface.whole is None:
+    if not surface.cut.is_cut:
         return 0.0, 0.0
-    curved = trace_functions(surface, facet, values[:, None])[:, 0]
-    nodes, corners = trace_nodes(surface, facet), surface.facets[facet]
+    curved = surface.cut.functions(facet, values)
+    nodes, corners = surface.cut.nodes(surface.facets, facet), surface.facets[facet]
     for number, shares in ((nodes, curved), (corners, -values)):
         np.add.at(into.points, number, (by_bulge[:, None] * shares)[..., None] * direction[:, None])
     along = np.einsum("nkd,nd->nk", surface.points[nodes], direction)
-    by_curved = (by_bulge[:, None] * along)[:, None]
-    by_values = trace_functions_pulled_back(surface, facet, values[:, None], by_curved)[:, 0]
+    by_values = surface.cut.pulled_back(facet, values, by_bulge[:, None] * along)
     by_values = by_values - by_bulge[:, None] * np.einsum("nkd,nd->nk", surface.points[corners], direction)
     raised = np.einsum("nk,nkd->nd", curved, surface.points[nodes])
     raised -= np.einsum("nk,nkd->nd", values, surface.points[corners])
@@ -290,7 +286,7 @@ class _BySums:
         right: Factors at each master node, shape (n_master, r).
         relief: By ∫ ψ_i times the heights, shape (n, dim).
         mean: Factors of the derivatives by the integrals with the slave's functions, shape (n, r).
-        own: Factors at each slave node, shape (n, r); None where its means are its nodes.
+        own: Factors at each slave node, shape (n, r), none where its means are its nodes.
     """
 
     area: np.ndarray
@@ -298,7 +294,7 @@ class _BySums:
     right: np.ndarray
     relief: np.ndarray
     mean: np.ndarray
-    own: np.ndarray | None
+    own: np.ndarray
 
     @property
     def felt(self) -> np.ndarray:
@@ -309,8 +305,6 @@ class _BySums:
     def by_integrals(self, nodes: np.ndarray, traces: Traces) -> np.ndarray:
         """Return the derivatives by the integrals with the functions of traces, (n_pairs, corners, f)."""
         by_weights = self.left[nodes] @ self.right[traces.master].transpose(0, 2, 1)
-        if self.own is None:
-            return by_weights
         by_means = self.mean[nodes] @ self.own[traces.slave].transpose(0, 2, 1)
         return np.concatenate([by_weights, by_means], axis=2)
 
@@ -323,13 +317,12 @@ def _sums_pulled_back(
     along = by.gap[:, None] * coupling.normal
     left = np.concatenate([by.left, -along], axis=1)
     right = np.concatenate([by.right, master.points - middle], axis=1)
-    own = None
-    if coupling.own is not None and slave.whole is not None:
+    of_slave, own = (np.zeros((len(some), 0)) for some in (coupling.node, slave.nodes))
+    if coupling.own is not None and slave.cut.is_cut:
         given = np.zeros((len(slave.nodes), by.right.shape[1])) if by.own is None else by.own
-        own = np.concatenate([given, slave.points - middle], axis=1)
-    of_slave, own = _of_shares(-left, own, coupling.own, coupling.area)
+        given = np.concatenate([given, slave.points - middle], axis=1)
+        of_slave, own = _of_shares(-left, given, coupling.own, coupling.area)
     left, every = _of_shares(left, right, coupling.weight, coupling.area)
-    assert every is not None
     by_relief = along if by.relief is None else along + by.relief
     by_area = by.area - np.einsum("nd,nd->n", by_relief, coupling.relief) / coupling.area
 
@@ -343,11 +336,9 @@ def _sums_pulled_back(
 
 
 def _of_shares(
-    left: np.ndarray, right: np.ndarray | None, weight: sp.csr_matrix | None, area: np.ndarray
-) -> tuple[np.ndarray, np.ndarray | None]:
+    left: np.ndarray, right: np.ndarray, weight: sp.csr_matrix, area: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Differentiate integrals over their row sums: return the factors for the integrals."""
-    if right is None or weight is None:
-        return np.zeros((len(area), 0)), None
     mean = np.einsum("nr,nr->n", left, weight @ right)
     left = np.concatenate([left, -mean[:, None]], axis=1) / area[:, None]
     return left, np.concatenate([right, np.ones((len(right), 1))], axis=1)
