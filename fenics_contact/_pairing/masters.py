@@ -25,8 +25,8 @@ from fenics_contact._pairing.points import (
 )
 from fenics_contact._pairing.projection import shared_projection
 from fenics_contact._scene.local_axes import LocalAxes
-from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.obstacles import MovingObstacle
+from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
