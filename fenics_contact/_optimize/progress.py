@@ -60,7 +60,7 @@ class Resumable(Function, Protocol):
 class _Forgetful:
     """The memory of a function whose values depend on no earlier ones."""
 
-    comm: MPI.Comm | None = None
+    comm = None
 
     def fingerprint(self) -> Mapping[str, str]:
         return {}
@@ -104,7 +104,7 @@ class Progress:
         )
         self._constrained = bool(problem.nonlinear)
         self._fun = problem.fun if isinstance(problem.fun, Resumable) else _Forgetful()
-        self.comm = self._fun.comm
+        self.comm: MPI.Comm | None = self._fun.comm
 
     def recalled(self) -> MethodState | None:
         """Return the stored state, None where the run starts anew. Collective."""
