@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import TypeAlias
 
 from fenics_contact._adaptive.levels import (
     AccurateResult,
@@ -78,14 +79,25 @@ def solve_steps_to(
         require_share(relative_error)
         objective = named(quantity, scene) if isinstance(quantity, str) else quantity
     results: list[AccurateResult] = []
-    last: _StepLoop | None = None
+    carried: Carried = _nothing
     for number, step in enumerate(steps, start=1):
         with together(comm):
             scene = step.applied_to(scene)
-        last = _StepLoop(timed(step, number), last, objective, relative_error, limits or Limits(), comm)
+        last = _StepLoop(timed(step, number), carried, objective, relative_error, limits or Limits(), comm)
+        carried = last.to_next
         show = None if callback is None else partial(callback, step)
         results.append(followed(last, ContactProblem(scene, comm, solver=solver, tolerance=tolerance), show))
     return tuple(results)
+
+
+#: Body name -> the refinements that led to its mesh.
+Chains: TypeAlias = "dict[str, tuple[Refinement, ...]]"
+#: Returns the state of the step before on the meshes of a scene.
+Carried: TypeAlias = "Callable[[Scene, Chains], TransferredState | None]"
+
+
+def _nothing(scene: Scene, new: Chains) -> None:
+    """Return that no step comes before the first."""
 
 
 class _StepLoop(AdaptiveLoop):
@@ -94,7 +106,7 @@ class _StepLoop(AdaptiveLoop):
     def __init__(
         self,
         step: LoadStep,
-        before: _StepLoop | None,
+        carried: Carried,
         quantity: Objective,
         wanted: float,
         limits: Limits,
@@ -102,9 +114,9 @@ class _StepLoop(AdaptiveLoop):
     ) -> None:
         super().__init__(quantity, wanted, limits, comm)
         self.where, self._step = f" in load step {step.name!r}", step
-        # The last state of the step before, and the refinements of each body that led to its meshes.
-        self._before = None if before is None else (before._state, before._chains)
-        self._chains: dict[str, tuple[Refinement, ...]] = {}
+        self._carried = carried
+        # The refinements of each body that led to the last meshes.
+        self._chains: Chains = {}
 
     def _solved(self, problem: ContactProblem) -> State:
         """Return the state on the next mesh. Collective."""
@@ -114,16 +126,14 @@ class _StepLoop(AdaptiveLoop):
         return problem.solve(
             start=start,
             refinements=refinements,
-            before=self._carried(problem.scene),
+            before=self._carried(problem.scene, self._chains),
             step=self._step,
             adjoint=True,
         )
 
-    def _carried(self, scene: Scene) -> TransferredState | None:
-        """Return the state of the step before on the meshes of now."""
-        if self._before is None:
-            return None
-        (state, old), new = self._before, self._chains
+    def to_next(self, scene: Scene, new: Chains) -> TransferredState:
+        """Return the last state on the meshes of the next step."""
+        state, old = self._state, self._chains
         names = (name for name in scene.bodies if name in old or name in new)
         return TransferredState(
             state, {name: MeshTransfer(old.get(name, ()), new.get(name, ())) for name in names}

@@ -20,7 +20,7 @@ from fenics_contact._pairing.inside import (
     points_inside,
 )
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
-from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._surfaces.facets import corner_places, edge_distance
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
@@ -90,7 +90,7 @@ def between_nodes(state: State, number: int, moved: float = 0.0) -> Missed | Non
     if missed is None:
         return None
     missed = replace(missed, moved=max(missed.moved, moved))
-    least = least_depth(missed.moved, presses=_presses(state, number))
+    least = least_depth(missed.moved, _pressing_points(state, number))
     return missed if missed.deepest.missed.max() > least else None
 
 
@@ -98,7 +98,7 @@ def _missed(state: State, number: int) -> Missed | None:
     """Return where facets of a pair lie deeper than their nodes, None where none does. Collective."""
     scene, comm = state.scene, state.torn.decomposition.comm
     pair = scene.contacts[number]
-    if pair.is_self_contact or pair.nodes is not None or pair.given_gap:
+    if not can_miss(pair):
         return None
     found: Missed | None = None
     with together(comm):
@@ -115,6 +115,11 @@ def _missed(state: State, number: int) -> Missed | None:
     return comm.bcast(found)
 
 
+def can_miss(pair: ContactPair) -> bool:
+    """Return whether a pair may miss contact between nodes, whose gaps and nodes are not given."""
+    return not (pair.is_self_contact or pair.nodes is not None or pair.given_gap)
+
+
 def _presses(state: State, number: int) -> bool:
     return bool(state.contact.normal_force[state.contact.on_pair(number)].any())
 
@@ -128,9 +133,9 @@ def _pressing_points(state: State, number: int) -> int:
     return int(np.count_nonzero(state.contact.normal_force[state.contact.on_pair(number)] > 0.0))
 
 
-def least_depth(moved: float, *, presses: bool) -> float:
-    """Return the depth between nodes up to which nothing is missed where surfaces move so far, [length]."""
-    return (SHARE if presses else ALONE) * moved
+def least_depth(moved: float, pressing: int) -> float:
+    """Return the depth up to which nothing is missed where so many points press and surfaces move so far."""
+    return (SHARE if pressing else ALONE) * moved
 
 
 def where_they_are(state: State, undeformed: InsideOf, number: int) -> InsideOf:
@@ -256,7 +261,7 @@ class InsideFacets:
 def _pressing(state: State, missed: Missed, busy: np.ndarray) -> InFacets:
     """Return points inside facets that a pair misses; marks them as `busy`, shape (n_points,)."""
     contact, points = state.contact, state.contact.points
-    least = least_depth(missed.moved, presses=_presses(state, missed.number))
+    least = least_depth(missed.moved, _pressing_points(state, missed.number))
     depth = missed.deepest.missed
     total = depth + missed.pressed_in
     relief = RELIEF * np.minimum(missed.bulge, total)

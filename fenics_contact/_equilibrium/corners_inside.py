@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact._equilibrium.between_nodes import displaced_at, least_depth, where_they_are
+from fenics_contact._equilibrium.between_nodes import can_miss, displaced_at, least_depth, where_they_are
 from fenics_contact._pairing.inside import InsideOf
 from fenics_contact._pairing.masters import BodyMaster
 from fenics_contact._scene.pairs import Surface
@@ -90,12 +90,7 @@ def corner_between_nodes(state: State, number: int) -> BetweenNodes | None:
     Collective. None where there is none, and where its gaps are given.
     """
     pair, comm = state.scene.contacts[number], state.torn.decomposition.comm
-    if (
-        pair.is_self_contact
-        or pair.nodes is not None
-        or pair.given_gap
-        or not isinstance(pair.master, Surface)
-    ):
+    if not (can_miss(pair) and isinstance(pair.master, Surface)):
         return None
     with together(comm):
         corners = _Corners.of(state, number)
@@ -126,7 +121,7 @@ def _doubt(state: State, number: int, corners: _Corners, moved: np.ndarray) -> B
         missed = np.where(near & (gap == nearest), max(min(nearest, lowest), 0.0), 0.0)
     at = int(np.argmax(missed))
     far = float(np.abs(closing[missed > 0.0]).max(initial=0.0))
-    least = least_depth(far, presses=len(pressing) > 0)
+    least = least_depth(far, len(pressing))
     if far <= computed_rounding(corners.sides.slave.points) or missed[at] <= least:
         return None
     where = tuple(map(float, corners.master.points[corners.node[at]]))

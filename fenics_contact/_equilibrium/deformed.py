@@ -120,7 +120,7 @@ class DeformedEquilibria:
             load = self._loading(scene, wanted.time, wanted.step, overlap)
             acted, load = start.loads(load, equations.contact)
             if self._unresisted is None:  # supports stay what they are in later steps
-                self._unresisted = unresisted_motions(load.torn)
+                self._unresisted = unresisted_motions(load.torn, scene.foundations)
             require_resisted(self._unresisted, load.torn, load.prescribed)
             begin = start.configuration(equations, acted)
         try:
@@ -393,7 +393,7 @@ def moved_as(at: Configuration, acted: Loading, load: Loading, contact: Contact)
 
 def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
     """Name motions that elastic foundations alone resist: Newton's method may need more. Collective."""
-    alone = unresisted_motions(torn, sprung=False) if torn.scene.foundations else ()
+    alone = unresisted_motions(torn, ()) if torn.scene.foundations else ()
     if alone:
         raise InfeasibleError(
             f"elastic foundations alone hold body {alone[0]}, but Newton's method needs supports, ties or "

@@ -18,7 +18,7 @@ from fenics_contact._equilibrium.linear import DirectEquilibria, LinearEquilibri
 from fenics_contact._equilibrium.other_rows import continued
 from fenics_contact._equilibrium.previous import ONLY_STEP, Equilibria, NoEquilibria, Previous, Wanted, after
 from fenics_contact._equilibrium.stored import Stored
-from fenics_contact._equilibrium.warnings import ContactWarnings
+from fenics_contact._equilibrium.warnings import ContactWarnings, DeferredWarnings
 from fenics_contact._scene.memory import Fit
 from fenics_contact._scene.plan import SolverKind, choose_solver
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -77,7 +77,7 @@ class ContactProblem:
         self.timer = PhaseTimer()
         self.state = None
         self._partitions, self._decomposition, self._memory = partitions, None, memory
-        self._warnings = ContactWarnings()
+        self._warnings: ContactWarnings = ContactWarnings()
 
     state: AnyState | None
     _decomposition: Decomposition | None
@@ -152,10 +152,10 @@ class ContactProblem:
         other._warnings = self._warnings
         return other
 
-    def defer_warnings(self) -> ContactWarnings:
-        """Let only the last state be warned of, when the `ContactWarnings` of the result are logged."""
-        self._warnings = ContactWarnings(of_last=True)
-        return self._warnings
+    def defer_warnings(self) -> DeferredWarnings:
+        """Let only the last state be warned of, when the `DeferredWarnings` of the result are logged."""
+        self._warnings = deferred = DeferredWarnings()
+        return deferred
 
     def number(self, scene: Scene | None = None) -> float:
         """Return the tolerance as a number, for states that are differentiated or compared. Collective.
@@ -166,7 +166,7 @@ class ContactProblem:
         Args:
             scene: As for `solve`.
         """
-        scene = self.scene if scene is None else scene
+        scene = scene or self.scene
         with together(self.comm):
             given = checked_tolerance(self.tolerance)
         if isinstance(given, float):
@@ -246,7 +246,7 @@ class ContactProblem:
             >>> state = fine.solve(start=coarse, refinements={"block": finer})  # doctest: +SKIP
         """
         check_not_forked()
-        scene, previous = self.scene if scene is None else scene, Previous(after(before))
+        scene, previous = scene or self.scene, Previous(after(before))
         with together(self.comm):
             accuracy = checked_tolerance(self.tolerance if tolerance is None else tolerance)
             wanted = Wanted(accuracy, step or ONLY_STEP, design)
@@ -320,7 +320,7 @@ class ContactProblem:
         Raises:
             InvalidInputError: If the arrays are those of another system.
         """
-        scene = self.scene if scene is None else scene
+        scene = scene or self.scene
         scene = continued(scene, stored)
         return self._equilibria(scene, sensitivity=False).restored(stored, scene, self.state)
 

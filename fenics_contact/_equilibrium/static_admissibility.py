@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,6 +13,7 @@ import scipy.sparse as sp
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.plan import MOTION_ROUNDING, held_components, point_loads, resisted_motions
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
@@ -43,7 +45,7 @@ def check_held(torn: TornSystem) -> None:
     """
     comm = torn.numbering.comm
     with together(comm):
-        bodies = rigid_bodies(torn)
+        bodies = rigid_bodies(torn, torn.scene.foundations)
     loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
     loads[np.abs(loads) <= ROUNDING * comm.allreduce(np.abs(torn.load).sum())] = 0.0
     with together(comm):
@@ -119,16 +121,13 @@ def _of_joints(torn: TornSystem, bodies: list[RigidBody]) -> sp.csr_matrix:
     return sp.hstack(parts, format="csr")
 
 
-def rigid_bodies(torn: TornSystem, *, sprung: bool = True) -> list[RigidBody]:
+def rigid_bodies(torn: TornSystem, foundations: Sequence[ElasticFoundation]) -> list[RigidBody]:
     """Return the bodies regarded as rigid; sections of preloads separate some into parts."""
     found = []
     for index, body in enumerate(torn.scene.bodies.values()):
-        if not body.mesh.cuts:
-            found.append(RigidBody(torn, index, sprung=sprung))
-            continue
-        part = parts_of(body.mesh)
+        part = parts_of(body.mesh) if body.mesh.cuts else np.zeros(body.mesh.n_nodes, dtype=int)
         marks = (part == number for number in range(part.max() + 1))
-        found += [RigidBody(torn, index, mark, sprung=sprung) for mark in marks]
+        found += [RigidBody(torn, index, mark, foundations) for mark in marks]
     return found
 
 
@@ -136,22 +135,19 @@ class RigidBody:
     """A body regarded as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
 
     def __init__(
-        self, torn: TornSystem, index: int, part: np.ndarray | None = None, *, sprung: bool = True
+        self, torn: TornSystem, index: int, part: np.ndarray, foundations: Sequence[ElasticFoundation]
     ) -> None:
         tearing = torn.decomposition.tearing
         self.name = tearing.body_names[index]
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
         body = torn.scene.bodies[self.name]
-        self._points = body.mesh.points
-        self._modes = body.rigid_modes()
-        if part is not None:
-            self._modes = np.where(part[:, None, None], self._modes, 0.0)
-            self._points = self._points[part]
+        self._points = body.mesh.points[part]
+        self._modes = np.where(part[:, None, None], body.rigid_modes(), 0.0)
         supports = resisted_motions(held_components(torn.scene, self.name, self._modes))
         #: Wrenches that supports and material can exert in both directions, shape (n_modes, n).
         self.support = _both(supports, _resisted_by_material(body, self._modes))
-        beds = [each for each in torn.scene.foundations if each.body == self.name]
-        if beds and sprung:
+        beds = [each for each in foundations if each.body == self.name]
+        if beds:
             motions = self._modes.reshape(-1, self._modes.shape[2])
             held, _ = separated(foundation_stiffness(beds, body), motions)
             self.support = _both(self.support, held)
@@ -424,13 +420,15 @@ def _in_words(place: np.ndarray, size: float) -> str:
 CHUNK = 4096
 
 
-def unresisted_motions(torn: TornSystem, *, sprung: bool = True) -> tuple[UnheldMotion, ...]:
+def unresisted_motions(
+    torn: TornSystem, foundations: Sequence[ElasticFoundation]
+) -> tuple[UnheldMotion, ...]:
     """Return the rigid motions that no support, tie, contact or material resists at rest. Collective.
 
     Contact counts wherever its surfaces face each other, also across a gap, and in both directions. Surfaces
     with friction and obstacles that move may meet anywhere later: they count against all motions.
     """
-    return on_root_then_bcast(torn.numbering.comm, lambda: _unresisted(torn, sprung))
+    return on_root_then_bcast(torn.numbering.comm, lambda: _unresisted(torn, foundations))
 
 
 def require_resisted(motions: tuple[UnheldMotion, ...], torn: TornSystem, prescribed: np.ndarray) -> None:
@@ -466,8 +464,8 @@ def unresisted_in_words(motions: list[UnheldMotion] | tuple[UnheldMotion, ...]) 
     )
 
 
-def _unresisted(torn: TornSystem, sprung: bool) -> tuple[UnheldMotion, ...]:
-    bodies = rigid_bodies(torn, sprung=sprung)
+def _unresisted(torn: TornSystem, foundations: Sequence[ElasticFoundation]) -> tuple[UnheldMotion, ...]:
+    bodies = rigid_bodies(torn, foundations)
     if all(body.held for body in bodies):
         return ()
     supports = sp.block_diag([body.support for body in bodies])

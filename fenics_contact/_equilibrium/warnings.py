@@ -76,16 +76,12 @@ class Doubt:
 
 
 class ContactWarnings:
-    """Warnings about the states of a problem; each pair, body and two bodies are warned of once.
+    """Warnings about the states of a problem; each pair, body and two bodies are warned of once."""
 
-    `of_last`: whether only those about the last state count, and are logged when `tell` asks for them.
-    """
-
-    def __init__(self, *, of_last: bool = False) -> None:
+    def __init__(self) -> None:
         """Start without any."""
         self._given: set[Hashable] = set()
         self._values: set[str] = set()
-        self._held: list[tuple[Callable[..., None], str]] | None = [] if of_last else None
         self._points: ContactPoints | None = None
         self._finer = np.zeros(0)
         self._rotations = dict[str, tuple[BodyMesh, float]]()
@@ -93,9 +89,7 @@ class ContactWarnings:
 
     def examined(self, state: AnyState, *, design: bool = False) -> AnyState:
         """Return a state with its doubts about peaks, and warn of what is doubtful. Collective."""
-        if self._held is not None:
-            self._held.clear()
-            self._given.clear()
+        self._begin()
         if isinstance(state, LinearState):
             if design and self._points is not None:
                 return state
@@ -141,20 +135,18 @@ class ContactWarnings:
 
     def _log(self, state: State, key: Hashable, words: str, log: Callable[..., None] | None = None) -> None:
         if key not in self._given and state.torn.decomposition.comm.rank == 0:
-            if self._held is None:
-                safe_log(log or _LOG.warning, "%s", words)
-            else:
-                self._held.append((log or _LOG.warning, words))
+            self._write(log or _LOG.warning, words)
         self._given.add(key)
+
+    def _begin(self) -> None:
+        """Begin with another state."""
+
+    def _write(self, log: Callable[..., None], words: str) -> None:
+        safe_log(log, "%s", words)
 
     def _log_doubt(self, state: State, doubt: Doubt) -> None:
         key = doubt.pair, doubt.kind, doubt.is_small
         self._log(state, key, doubt.words, _LOG.info if doubt.is_small else None)
-
-    def tell(self) -> None:
-        """Log the warnings about the last state that were held back."""
-        for log, words in self._held or ():
-            safe_log(log, "%s", words)
 
     def _doubts(self, state: LinearState) -> tuple[list[Doubt], tuple[PeakUncertainty, ...]]:
         """Return all doubts about a state, and those about peaks. Collective."""
@@ -258,6 +250,27 @@ class ContactWarnings:
         if known is None or known[0].cells is not mesh.cells:
             known = self._outlines[name] = (mesh, outline_of(mesh))
         return known[1]
+
+
+class DeferredWarnings(ContactWarnings):
+    """Warnings of which those about the last state count, and are logged when `tell` asks for them."""
+
+    def __init__(self) -> None:
+        """Start without any."""
+        super().__init__()
+        self._deferred: list[tuple[Callable[..., None], str]] = []
+
+    def tell(self) -> None:
+        """Log the warnings about the last state."""
+        for log, words in self._deferred:
+            safe_log(log, "%s", words)
+
+    def _begin(self) -> None:
+        self._deferred.clear()
+        self._given.clear()
+
+    def _write(self, log: Callable[..., None], words: str) -> None:
+        self._deferred.append((log, words))
 
 
 @dataclass(frozen=True)

@@ -91,6 +91,48 @@ class Recorded(Protocol):
 RecordedPoint = TypeVar("RecordedPoint", bound=Recorded)
 
 
+@dataclass(frozen=True, eq=False)
+class _Evaluated(Generic[RecordedPoint]):
+    """An evaluated design."""
+
+    point: RecordedPoint
+
+    @property
+    def alpha(self) -> np.ndarray:
+        return self.point.alpha
+
+    @property
+    def value(self) -> float:
+        return float(self.point.value)
+
+    def built(self, build: Callable[[Stored], RecordedPoint]) -> _Evaluated[RecordedPoint]:
+        return self
+
+    def arrays(self, arrays_of: Callable[[RecordedPoint], Stored]) -> Stored:
+        return arrays_of(self.point)
+
+
+@dataclass(frozen=True, eq=False)
+class _InArrays:
+    """A design of an earlier run."""
+
+    stored: Stored
+
+    @property
+    def alpha(self) -> np.ndarray:
+        return self.stored["alpha"]
+
+    @property
+    def value(self) -> float:
+        return float(self.stored["value"])
+
+    def built(self, build: Callable[[Stored], RecordedPoint]) -> _Evaluated[RecordedPoint]:
+        return _Evaluated(build(self.stored))
+
+    def arrays(self, arrays_of: Callable[[RecordedPoint], Stored]) -> Stored:
+        return self.stored
+
+
 class DesignRecord(Generic[RecordedPoint]):
     """The first, best and last evaluated design; of an earlier run as arrays until they are asked for."""
 
@@ -99,34 +141,35 @@ class DesignRecord(Generic[RecordedPoint]):
     ) -> None:
         """Start empty; ``arrays_of`` stores a design, ``build`` rebuilds it (collective)."""
         self._build, self._arrays_of = build, arrays_of
-        self._points: dict[str, RecordedPoint | Stored] = {}
+        self._points: dict[str, _Evaluated[RecordedPoint] | _InArrays] = {}
         self.evaluations = 0
 
     def record(self, point: RecordedPoint) -> None:
         """Store an evaluated design."""
         self.evaluations += 1
-        first, best = self._points.get("first"), self._points.get("best")
-        if first is None or np.array_equal(point.alpha, _alpha(first)):
-            self._points["first"] = point
-        if best is None or point.value < _value(best) or np.array_equal(point.alpha, _alpha(best)):
-            self._points["best"] = point
-        self._points["last"] = point
+        known = _Evaluated(point)
+        first, best = (self._points.get(name, known) for name in ("first", "best"))
+        if np.array_equal(point.alpha, first.alpha):
+            self._points["first"] = known
+        if point.value < best.value or np.array_equal(point.alpha, best.alpha):
+            self._points["best"] = known
+        self._points["last"] = known
 
     def of_design(self, alpha: np.ndarray) -> RecordedPoint | None:
         """Return the stored evaluation of exactly this design, if any. Collective after a run was resumed."""
         for name in ("last", "best", "first"):
-            if name in self._points and np.array_equal(_alpha(self._points[name]), alpha):
+            if name in self._points and np.array_equal(self._points[name].alpha, alpha):
                 return self.point(name)
         return None
 
     def point(self, name: str) -> RecordedPoint | None:
         """Return a design by its name; one of an earlier run is rebuilt first. Collective then."""
-        stored = self._points.get(name)
-        if not isinstance(stored, dict):
-            return stored
-        built = self._build(stored)
-        self._points = {key: built if point is stored else point for key, point in self._points.items()}
-        return built
+        if name not in self._points:
+            return None
+        known = self._points[name]
+        built = known.built(self._build)
+        self._points = {key: built if point is known else point for key, point in self._points.items()}
+        return built.point
 
     def stored(self) -> Stored:
         """Return everything as arrays. Collective."""
@@ -137,7 +180,7 @@ class DesignRecord(Generic[RecordedPoint]):
                 arrays[f"{name}.{_SAME}"] = np.array(names[id(point)])
                 continue
             names[id(point)] = name
-            parts = point if isinstance(point, dict) else self._arrays_of(point)
+            parts = point.arrays(self._arrays_of)
             arrays.update({f"{name}.{part}": values for part, values in parts.items()})
         return arrays
 
@@ -148,7 +191,7 @@ class DesignRecord(Generic[RecordedPoint]):
             name, _, part = key.partition(".")
             parts.setdefault(name, {})[part] = values
         self.evaluations = int(parts.pop("evaluations")[""])
-        points = {name: stored for name, stored in parts.items() if _SAME not in stored}
+        points = {name: _InArrays(stored) for name, stored in parts.items() if _SAME not in stored}
         points |= {name: points[str(stored[_SAME])] for name, stored in parts.items() if _SAME in stored}
         self._points = dict(points)
 
@@ -212,7 +255,7 @@ class DesignMemory(DesignRecord[DesignPoint]):
         state = self._restore(stored["alpha"], parts)
         return DesignPoint(
             alpha=stored["alpha"],
-            value=_value(stored),
+            value=float(stored["value"]),
             gradient=stored["gradient"],
             state=state,
             weak=weak,
@@ -239,14 +282,6 @@ def _stored_point(point: DesignPoint) -> Stored:
         "adjoint": numbering.gather(point.adjoint_multiplier, np.arange(numbering.total)),
         **{f"{_STATE}{part}": values for part, values in stored_state(point.state).items()},
     }
-
-
-def _value(point: Recorded | Stored) -> float:
-    return float(point["value"] if isinstance(point, dict) else point.value)
-
-
-def _alpha(point: Recorded | Stored) -> np.ndarray:
-    return point["alpha"] if isinstance(point, dict) else point.alpha
 
 
 #: Tolerance of a second attempt relative to the first: at most and at least.

@@ -312,13 +312,13 @@ class DesignGeometry:
         self.motions = [motion_of(decomposition, scene, design) for design in self.designs]
         self.moving = moving_nodes(scene, self.designs, self.motions)
         self.forms = ShapeForms(decomposition.comm, np.concatenate(list(self.moving.values())))
-        self._points: tuple[np.ndarray, dict[str, np.ndarray]] | None = None
-        self._last: tuple[np.ndarray, dict[str, Body]] | None = None
+        self._points: tuple[np.ndarray, dict[str, np.ndarray]] = (np.zeros(0), {})
+        self._last: tuple[np.ndarray, dict[str, Body]] = (np.zeros(0), {})
 
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
         """Return the coordinates of the designed bodies; of the last design they are known. Collective."""
         alpha = checked_variables(alpha, self.size, self._decomposition.comm)
-        if self._points is None or not np.array_equal(self._points[0], alpha):
+        if not np.array_equal(self._points[0], alpha):
             self._points = alpha.copy(), self._moved(alpha)
         return {name: points.copy() for name, points in self._points[1].items()}
 
@@ -335,7 +335,7 @@ class DesignGeometry:
 
         The scenes of one design have the same meshes, so that they share matrices and factors.
         """
-        if self._last is None or not np.array_equal(self._last[0], alpha):
+        if not np.array_equal(self._last[0], alpha):
             points = self.points_of(alpha)
             try:
                 moved = scene.reshaped(points)

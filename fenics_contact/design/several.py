@@ -414,12 +414,12 @@ class _States:
 
     def __init__(self, problems: Mapping[str, ShapeProblem]) -> None:
         self._problems = problems
-        self._alpha: np.ndarray | None = None
+        self._alpha: np.ndarray = np.zeros(0)
         self._known: dict[str, AnyState] = {}
 
     def of(self, alpha: np.ndarray) -> Mapping[str, AnyState]:
         """Return the states of a design. Collective."""
-        if self._alpha is not None and np.array_equal(self._alpha, alpha):
+        if np.array_equal(self._alpha, alpha):
             return self._known
         states: dict[str, AnyState] = {}
         last = None
