@@ -13,9 +13,9 @@ from ufl.core.expr import Expr
 from fenics_contact._base.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import (
-    Elasticity,
+    Expanding,
     as_tensor,
-    numbers,
+    expansions,
     rotated_stiffness,
     strain,
     strain_vector,
@@ -40,7 +40,7 @@ def checked_axes(orientation: tuple[Triple, Triple, Triple]) -> tuple[Triple, Tr
     return tuple(tuple(float(c) for c in axis) for axis in axes)  # type: ignore[return-value]
 
 
-class SpatialElasticity(Elasticity):
+class SpatialElasticity(Expanding):
     """σ = C : (ε(u) − ΔT α) with a stiffness matrix C and expansions α in axes of the material."""
 
     orientation: tuple[Triple, Triple, Triple]
@@ -55,11 +55,6 @@ class SpatialElasticity(Elasticity):
     def dims(self) -> tuple[int, ...]:
         """Bodies in space."""
         return (3,)
-
-    @property
-    def expands(self) -> bool:
-        """Whether thermal expansions were given."""
-        return self.thermal_expansion is not None
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -126,9 +121,7 @@ class AnisotropicElasticity(SpatialElasticity):
         rows = tuple(tuple(float(value) for value in row) for row in C)
         object.__setattr__(self, "moduli", rows)
         object.__setattr__(self, "orientation", checked_axes(self.orientation))
-        if self.thermal_expansion is not None:
-            values = numbers("thermal_expansion", self.thermal_expansion, 6, order)
-            object.__setattr__(self, "thermal_expansion", values)
+        object.__setattr__(self, "thermal_expansion", expansions(self.thermal_expansion, 6, order))
 
     @cached_property
     def stiffness_matrix(self) -> np.ndarray:

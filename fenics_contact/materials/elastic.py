@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import ufl
@@ -66,6 +66,11 @@ def numbers(name: str, values: Sequence[float], count: int, meaning: str) -> tup
     return tuple(float(value) for value in array)
 
 
+def expansions(values: Sequence[float] | None, count: int, meaning: str) -> tuple[float, ...] | None:
+    """Return ``count`` thermal expansions as floats, None if none were given."""
+    return None if values is None else numbers("thermal_expansion", values, count, meaning)
+
+
 def strain(u: Expr) -> Expr:
     """Return the small strain ε(u) = ½ (∇u + ∇uᵀ)."""
     return ufl.sym(ufl.grad(u))
@@ -121,6 +126,17 @@ class Elasticity(ABC):
         return rigid_body_modes(points)
 
 
+class Expanding(Elasticity):
+    """A model that may have a thermal expansion α, None without one."""
+
+    thermal_expansion: Any
+
+    @property
+    def expands(self) -> bool:
+        """Whether α was given."""
+        return self.thermal_expansion is not None
+
+
 class Plate(Elasticity):
     """A plane model with a thickness: forces, moments and energies are those of the whole thickness.
 
@@ -136,7 +152,7 @@ class Plate(Elasticity):
 
     def per_area(self, density: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return a density per volume as one per area of the plane (UFL)."""
-        return density if self.thickness is None else parameters[-1] * density
+        return parameters[-1] * density if self.of_thickness else density
 
     def stiffness(self, u: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return σ(u) : ε(v), times the thickness."""
@@ -156,7 +172,7 @@ def thickness_of(material: object) -> float | None:
 
 @dataclass(frozen=True)
 @checked()
-class Isotropic(Elasticity):
+class Isotropic(Expanding):
     """The constants that all isotropic models have."""
 
     young_modulus: float
@@ -166,11 +182,6 @@ class Isotropic(Elasticity):
     def __post_init__(self) -> None:
         """Reject constants for which the strain energy is not positive."""
         check_isotropic(self.young_modulus, self.poisson_ratio, self.thermal_expansion)
-
-    @property
-    def expands(self) -> bool:
-        """Whether α was given."""
-        return self.thermal_expansion is not None
 
     @property
     def expansion(self) -> tuple[float, ...]:

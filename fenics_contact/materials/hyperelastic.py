@@ -17,6 +17,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import (
     Elasticity,
+    Expanding,
     check_expansion,
     check_isotropic,
     lame,
@@ -94,7 +95,7 @@ class EnergyModel(Elasticity):
         return True
 
 
-class Hyperelasticity(Elasticity):
+class Hyperelasticity(Expanding):
     """Elasticity for large deformations, given by its energy density W; write `parameters` and `energy`.
 
     W is the energy per undeformed volume, a function of the deformation gradient F = I + ∇u. F has three rows
@@ -128,11 +129,6 @@ class Hyperelasticity(Elasticity):
 
     nonlinear: ClassVar[bool] = True
     thermal_expansion: float | None = None
-
-    @property
-    def expands(self) -> bool:
-        """Whether α was given."""
-        return self.thermal_expansion is not None
 
     @property
     def expansion(self) -> tuple[float, ...]:

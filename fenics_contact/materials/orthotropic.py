@@ -14,10 +14,12 @@ from fenics_contact._base.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.anisotropic import ALONG_XYZ, SpatialElasticity, Triple, checked_axes
 from fenics_contact.materials.elastic import (
+    Expanding,
     Plate,
     as_tensor,
     check_thickness,
     checked_stiffness,
+    expansions,
     numbers,
     require_positive,
     rotated_stiffness,
@@ -85,9 +87,7 @@ class OrthotropicElasticity(SpatialElasticity):
         order = "give those of the axes 1, 2, 3 (pairs 12, 13, 23)"
         for name in ("young_moduli", "poisson_ratios", "shear_moduli"):
             object.__setattr__(self, name, numbers(name, getattr(self, name), 3, order))
-        if self.thermal_expansion is not None:
-            values = numbers("thermal_expansion", self.thermal_expansion, 3, order)
-            object.__setattr__(self, "thermal_expansion", values)
+        object.__setattr__(self, "thermal_expansion", expansions(self.thermal_expansion, 3, order))
         for modulus in (*self.young_moduli, *self.shear_moduli):
             require_positive("each of young_moduli and shear_moduli", modulus, "give it in force per area")
         object.__setattr__(self, "orientation", checked_axes(self.orientation))
@@ -110,7 +110,7 @@ class OrthotropicElasticity(SpatialElasticity):
 
 @dataclass(frozen=True)
 @checked("young_moduli", "thermal_expansion")
-class OrthotropicPlaneStress(Plate):
+class OrthotropicPlaneStress(Plate, Expanding):
     """A thin orthotropic plate without stress normal to it.
 
     Attributes:
@@ -132,11 +132,10 @@ class OrthotropicPlaneStress(Plate):
 
     def __post_init__(self) -> None:
         """Reject constants for which the strain energy is not positive."""
-        moduli = numbers("young_moduli", self.young_moduli, 2, "give those of the axes 1 and 2")
+        order = "give those of the axes 1 and 2"
+        moduli = numbers("young_moduli", self.young_moduli, 2, order)
         object.__setattr__(self, "young_moduli", moduli)
-        if self.thermal_expansion is not None:
-            values = numbers("thermal_expansion", self.thermal_expansion, 2, "give those of the axes 1 and 2")
-            object.__setattr__(self, "thermal_expansion", values)
+        object.__setattr__(self, "thermal_expansion", expansions(self.thermal_expansion, 2, order))
         others = (self.poisson_ratio, self.shear_modulus, self.angle)
         if not np.isfinite(others).all() or min(*moduli, self.shear_modulus) <= 0:
             raise InvalidInputError(
@@ -163,11 +162,6 @@ class OrthotropicPlaneStress(Plate):
     def _axes(self) -> np.ndarray:
         c, s = np.cos(self.angle), np.sin(self.angle)
         return np.array([[c, s], [-s, c]])
-
-    @property
-    def expands(self) -> bool:
-        """Whether thermal expansions were given."""
-        return self.thermal_expansion is not None
 
     @property
     def parameters(self) -> tuple[float, ...]:

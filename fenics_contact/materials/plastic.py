@@ -16,7 +16,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import (
-    Elasticity,
+    Expanding,
     as_tensor,
     check_isotropic,
     lame,
@@ -54,7 +54,7 @@ class MaterialResponse:
     history: np.ndarray
 
 
-class HistoryMaterial(Elasticity):
+class HistoryMaterial(Expanding):
     """A material whose stress depends on what it went through; write its history_size and respond.
 
     The internal variables are zero at first, where the body is free of stress. Bodies in the plane are in
@@ -224,11 +224,6 @@ class HistoryMaterial(Elasticity):
     def transverse_stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the stress of the linear part normal to the plane."""
         return self._stress_vector(u, parameters, 3)[2]
-
-    @property
-    def expands(self) -> bool:
-        """Whether α was given."""
-        return self.thermal_expansion is not None
 
     def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the stress of the linear part that free expansion relieves per degree, 3 x 3."""
