@@ -47,6 +47,7 @@ from numpy.typing import NDArray
 
 from fenics_contact._base.files import write_whole
 from fenics_contact._base.fingerprint import differences
+from fenics_contact._base.launching import ranks_of
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
 
@@ -164,19 +165,17 @@ class Checkpoint:
         Raises:
             InvalidInputError: On all ranks, see `read_archive`.
         """
-        path, arrays = Path(self.path), None
         if self.resume is False:
             return None
-        if comm is None:
-            return read_archive(path, kind, fingerprint) if self.resume or path.exists() else None
-        with together(comm):
-            if comm.rank == 0 and (self.resume or path.exists()):
-                arrays = read_archive(path, kind, fingerprint)
-        names = comm.bcast(None if arrays is None else list(arrays))
-        if names is None:
-            return None
+        ranks, path = ranks_of(comm), Path(self.path)
+        arrays: Arrays = {}
+        stored = False
+        with together(ranks):
+            if ranks.rank == 0 and (self.resume or path.exists()):
+                arrays, stored = read_archive(path, kind, fingerprint), True
+        stored, names = ranks.bcast((stored, list(arrays)))
         # One by one: an MPI message is limited to 2 GB, which a long history exceeds.
-        return {name: comm.bcast(None if arrays is None else arrays[name]) for name in names}
+        return {name: ranks.bcast(arrays.get(name)) for name in names} if stored else None
 
     def write(
         self, kind: str, fingerprint: Mapping[str, str], arrays: Mapping[str, Any], comm: MPI.Comm | None
@@ -186,11 +185,9 @@ class Checkpoint:
         Raises:
             CheckpointError: On all ranks; the file is then unchanged.
         """
-        if comm is None:
-            write_archive(Path(self.path), kind, fingerprint, arrays)
-            return
-        with together(comm):
-            if comm.rank == 0:
+        ranks = ranks_of(comm)
+        with together(ranks):
+            if ranks.rank == 0:
                 write_archive(Path(self.path), kind, fingerprint, arrays)
 
     def resume_hint(self, done: int, kept: str) -> str:
@@ -251,7 +248,7 @@ class Interruption:
 
     def __init__(self, comm: MPI.Comm | None) -> None:
         """Begin without a signal."""
-        self.comm, self.requested = comm, 0
+        self.comm, self.requested = ranks_of(comm), 0
         self._kept = ""
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
@@ -262,32 +259,31 @@ class Interruption:
             self._say("%s: the run stops after the step under way, at once on a second signal%s", name)
             return
         self._say("%s again: the run stops at once%s", name)
-        if self.comm is not None and self.comm.size > 1:
+        if self.comm.size > 1:
             self.comm.Abort(128 + number)  # the other ranks would wait for this one forever
         raise Interrupted(f"stopped at once by {name}", number)
 
     def safe_point(
         self,
         kept: Callable[[], str] = str,
-        save: Callable[[], None] | None = None,
+        save: Callable[[], object] = str,
         comm: MPI.Comm | None = None,
     ) -> None:
         """Stop here if a rank received a signal. Collective on the communicator, by default the run's."""
         self._kept = kept()
         comm = comm or self.comm
-        number = self.requested if comm is None or comm.size == 1 else max(comm.allgather(self.requested))
+        number = max(comm.allgather(self.requested))
         if not number:
             return
-        if save is not None:
-            save()
+        save()
         words = kept()
         message = f"stopped by {signal.Signals(number).name}" + (f": {words}" if words else "")
-        if self.comm is None or self.comm.rank == 0:
+        if self.comm.rank == 0:
             safe_log(_LOG.warning, "%s", message)
         raise Interrupted(message, number)
 
     def _say(self, words: str, name: str) -> None:
-        if self.comm is None or self.comm.rank == 0:
+        if self.comm.rank == 0:
             # Launchers may kill the ranks a second later: report what is stored now.
             safe_log(_LOG.warning, words, name, f"; so far {self._kept}" if self._kept else "")
 
@@ -347,6 +343,6 @@ def reporting_what_is_stored(kept: Callable[[], str], comm: MPI.Comm | None) -> 
     except (KeyboardInterrupt, SystemExit) as stop:
         words = kept()
         stop.add_note(words)
-        if comm is None or comm.rank == 0:
+        if ranks_of(comm).rank == 0:
             safe_log(_LOG.info, "interrupted: %s", words)
         raise

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, cast
@@ -155,9 +155,9 @@ class Ledger:
         """Add to a field of the costs of the phase under way."""
         self._counts[name] += number
 
-    def call(self, kind: str, kinds: str, size: int) -> None:
-        """Add a collective call and its bytes to those of a kind, given in singular and plural."""
-        counts = self._counts
+    def call(self, kind: str, kinds: str, data: Sequence[Any]) -> None:
+        """Add a collective call and the bytes of its data to those of a kind, in singular and plural."""
+        counts, size = self._counts, sum(map(size_of, data))
         counts[kinds] += 1
         counts[f"{kind}_bytes"] += size
         if kind != "transfer":
@@ -175,31 +175,41 @@ class Ledger:
         return Costs(ranks, {name: PhaseCosts(**counts) for name, counts in self._phases.items()})
 
 
+class NoLedger(Ledger):
+    """What communicators without a ledger count with."""
+
+    def add(self, name: str, number: int = 1) -> None:
+        """Do nothing."""
+
+    def call(self, kind: str, kinds: str, data: Sequence[Any]) -> None:
+        """Do nothing."""
+
+
+NO_LEDGER = NoLedger()
+
+
 def with_ledger(comm: MPI.Comm) -> MPI.Comm:
     """Return the same communicator with a ledger, in which its calls are counted if it has several ranks."""
-    if ledger_of(comm) is not None:
+    if ledger_of(comm) is not NO_LEDGER:
         return comm
     recording: Any = _kinds()[comm.size > 1](comm)
     recording.ledger = Ledger()
     return cast("MPI.Comm", recording)
 
 
-def ledger_of(comm: MPI.Comm) -> Ledger | None:
-    """Return the ledger of a communicator, None if it has none."""
-    return getattr(comm, "ledger", None)
+def ledger_of(comm: MPI.Comm) -> Ledger:
+    """Return the ledger of a communicator."""
+    return getattr(comm, "ledger", NO_LEDGER)
 
 
 def costs_of(comm: MPI.Comm) -> Costs:
     """Return what this rank has sent over a communicator and computed so far; nothing without a ledger."""
-    ledger = ledger_of(comm)
-    return Costs(comm.size, {}) if ledger is None else ledger.costs(comm.size)
+    return ledger_of(comm).costs(comm.size)
 
 
 def count_flops(comm: MPI.Comm, number: int) -> None:
     """Add floating point operations to those of the phase under way."""
-    ledger = ledger_of(comm)
-    if ledger is not None:
-        ledger.add("flops", number)
+    ledger_of(comm).add("flops", number)
 
 
 def count_of_exchange(comm: MPI.Comm, owner: np.ndarray) -> tuple[int, int]:
@@ -217,7 +227,7 @@ def count_of_exchange(comm: MPI.Comm, owner: np.ndarray) -> tuple[int, int]:
 def count_messages(comm: MPI.Comm, exchange: tuple[int, int]) -> None:
     """Add the messages of an exchange and their bytes to those of the phase under way."""
     ledger = ledger_of(comm)
-    if exchange[0] and ledger is not None:
+    if exchange[0]:
         ledger.add("messages", exchange[0])
         ledger.add("message_bytes", exchange[1])
 
@@ -249,7 +259,7 @@ def _kinds() -> tuple[type, type]:
         """A communicator of one rank: its calls are those of MPI, and only operations are counted."""
 
         __module__ = "mpi4py.MPI"  # petsc4py takes no communicator of a class from elsewhere
-        ledger: Ledger | None = None  # of duplicates and parts
+        ledger: Ledger = NO_LEDGER  # of duplicates and parts
 
     class Counting(Alone):
         """A communicator that counts its calls; those of MPI that it does not list are not counted."""
@@ -294,7 +304,6 @@ def _kinds() -> tuple[type, type]:
             self._count("transfer", "transfers", np.delete(values, own))
 
         def _count(self, kind: str, kinds: str, *data: Any) -> None:
-            if self.ledger is not None:
-                self.ledger.call(kind, kinds, sum(map(size_of, data)))
+            self.ledger.call(kind, kinds, data)
 
     return Alone, Counting

@@ -16,6 +16,7 @@ import shutil
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from fenics_contact.errors import FenicsContactError
@@ -69,8 +70,7 @@ def hidden_folder(folder: Path, stem: str) -> Iterator[Path]:
         yield hidden
     finally:
         shutil.rmtree(hidden, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
+        lock.close()
 
 
 def remove_abandoned(folder: Path, abandoned: float = 24 * 3600.0) -> None:
@@ -83,11 +83,10 @@ def remove_abandoned(folder: Path, abandoned: float = 24 * 3600.0) -> None:
         if not _HIDDEN.fullmatch(left.name) or not left.is_dir():
             continue
         with suppress(OSError):  # another writer may remove it at the same time
-            taken, lock = locked(left)
-            if taken or (lock is None and time.time() - left.stat().st_mtime > abandoned):
+            lock = locked(left)
+            if lock.taken or (not lock.known and time.time() - left.stat().st_mtime > abandoned):
                 shutil.rmtree(left, ignore_errors=True)
-            if lock is not None:
-                os.close(lock)
+            lock.close()
 
 
 def replace_all(written: Sequence[Path], folder: Path) -> None:
@@ -107,31 +106,45 @@ def replace_all(written: Sequence[Path], folder: Path) -> None:
     synchronise(folder)
 
 
-def _made(folder: Path, stem: str) -> tuple[Path, int | None]:
+def _made(folder: Path, stem: str) -> tuple[Path, Lock]:
     """Create a hidden folder and lock it, if the file system supports locks."""
     while True:
         hidden = folder / f".{stem}.{secrets.token_hex(4)}.partial"
         hidden.mkdir()
         with suppress(FileNotFoundError):
-            taken, lock = locked(hidden)
+            lock = locked(hidden)
             # Before it was locked another writer may have taken it for abandoned.
-            if (taken or lock is None) and hidden.exists():
+            if (lock.taken or not lock.known) and hidden.exists():
                 return hidden, lock
-            if lock is not None:
-                os.close(lock)
+            lock.close()
 
 
-def locked(path: Path) -> tuple[bool, int | None]:
-    """Try to lock a file or folder; return the success and it opened, None where there are no locks."""
+@dataclass(frozen=True)
+class Lock:
+    """A file or folder that is open to be locked.
+
+    `taken`: by this process; `known`: whether the file system has locks.
+    """
+
+    descriptor: int
+    taken: bool
+    known: bool = True
+
+    def close(self) -> None:
+        """Release the lock."""
+        os.close(self.descriptor)
+
+
+def locked(path: Path) -> Lock:
+    """Try to lock a file or folder."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        return False, descriptor
+        return Lock(descriptor, taken=False)
     except OSError:
-        os.close(descriptor)
-        return False, None
-    return True, descriptor
+        return Lock(descriptor, taken=False, known=False)
+    return Lock(descriptor, taken=True)
 
 
 def synchronise(path: Path) -> None:

@@ -21,8 +21,12 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
 
 from fenics_contact.errors import MissingRequirementError
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 #: Prefixes of names that only Open MPI 4 and 5, PMIx, PMI, ORTE, PRRTE and MPICH write.
 _TRACES = (
@@ -69,6 +73,30 @@ def started_alone() -> Iterator[None]:
     finally:
         for name in found:
             os.environ.pop(name, None)
+
+
+class LoneProcess:
+    """What is asked of a communicator of one rank, in a program that need not load MPI."""
+
+    rank = 0
+    size = 1
+
+    def bcast(self, value: Any) -> Any:
+        """Return what rank 0 has."""
+        return value
+
+    def allgather(self, value: Any) -> list[Any]:
+        """Return what all ranks have."""
+        return [value]
+
+    def allreduce(self, value: Any) -> Any:
+        """Return the sum over all ranks."""
+        return value
+
+
+def ranks_of(comm: MPI.Comm | None) -> MPI.Comm:
+    """Return a communicator, or without one that of a process alone."""
+    return cast("MPI.Comm", LoneProcess()) if comm is None else comm
 
 
 def launcher(ranks: int) -> list[str]:

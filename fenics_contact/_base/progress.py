@@ -18,6 +18,7 @@ from time import perf_counter
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO
 
+from fenics_contact._base.launching import ranks_of
 from fenics_contact.errors.kinds import safe_log
 
 if TYPE_CHECKING:
@@ -117,15 +118,11 @@ class Task:
         number: int,
         *,
         measure: float | None = None,
-        target: float | None = None,
         value: float | None = None,
         words: str = "",
     ) -> None:
-        """Report progress by the attributes of an `Event`; a target only if it has changed."""
-        if LISTENERS or _LOGGER.isEnabledFor(logging.DEBUG):
-            known = {} if target is None else {"target": target}
-            given = {"measure": measure, "value": value, "words": words}
-            self._tell(Kind.STEP, number=number, **given, **known)
+        """Report progress by the attributes of an `Event`."""
+        self._tell(Kind.STEP, number=number, measure=measure, value=value, words=words)
 
     def end(self, error: BaseException | None = None) -> None:
         """Report that the work is over, and what it ended with instead of a result: a failure, or Ctrl-C."""
@@ -336,7 +333,7 @@ def show_progress(
         >>> with show_progress(MPI.COMM_WORLD):  # doctest: +SKIP
         ...     state = solve_scene(scene, MPI.COMM_WORLD)
     """
-    if LISTENERS or (comm is not None and comm.rank != 0):
+    if LISTENERS or ranks_of(comm).rank != 0:
         yield
         return
     works = Works()

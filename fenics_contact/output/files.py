@@ -26,7 +26,7 @@ import numpy as np
 
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import in_short
-from fenics_contact._base.files import hidden_folder, locked, replace_all
+from fenics_contact._base.files import Lock, hidden_folder, locked, replace_all
 from fenics_contact.errors import FenicsContactError, InvalidInputError, agree, together
 
 if TYPE_CHECKING:
@@ -261,31 +261,32 @@ def only_run_in(folder: str | Path, comm: MPI.Comm) -> Iterator[None]:
     finally:
         if lock is not None:
             path.unlink(missing_ok=True)
-            os.close(lock)
+            lock.close()
         if made:
             with suppress(OSError):  # not empty: something was written
                 path.parent.rmdir()
 
 
-def _taken(path: Path) -> int | None:
+def _taken(path: Path) -> Lock | None:
     """Lock a file, created if necessary; None where there are no locks."""
     while True:
         path.touch()
         with suppress(FileNotFoundError):  # its owner has removed it since
-            taken, lock = locked(path)
-            if lock is None:
+            lock = locked(path)
+            if not lock.known:
+                lock.close()
                 path.unlink(missing_ok=True)
                 _LOG.warning("%s: no locks there, let no other run write to this folder", path.parent)
                 return None
-            if not taken:
-                os.close(lock)
+            if not lock.taken:
+                lock.close()
                 owner = path.read_text(encoding="utf-8", errors="replace").strip()
                 raise InvalidInputError(
                     f"a folder must have one run at a time, another one ({owner or 'just begun'}) writes to "
                     f"{str(path.parent)!r}: wait for its end, or give this run another folder"
                 )
-            if path.exists() and os.path.samestat(os.fstat(lock), path.stat()):
+            if path.exists() and os.path.samestat(os.fstat(lock.descriptor), path.stat()):
                 begun = datetime.now().astimezone().isoformat(" ", "seconds")
                 path.write_text(f"process {os.getpid()} on {socket.gethostname()}, begun {begun}")
                 return lock
-            os.close(lock)
+            lock.close()

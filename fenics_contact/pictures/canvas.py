@@ -11,7 +11,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from io import BytesIO
@@ -29,7 +29,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from fenics_contact._base.files import write_atomically
-from fenics_contact._base.launching import clean_environment
+from fenics_contact._base.launching import clean_environment, ranks_of
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
 from fenics_contact.results.contact import Status
 
@@ -126,8 +126,9 @@ def png_path(path: str | Path | None) -> Path | None:
 def draw_picture(comm: MPI.Comm | None, path: Path | None, draw: Callable[[BinaryIO], None]) -> Picture:
     """Let rank 0 draw and write; if it fails, all ranks raise. Collective on ``comm`` if given."""
     png = None
-    with nullcontext() if comm is None else together(comm):
-        if comm is None or comm.rank == 0:
+    ranks = ranks_of(comm)
+    with together(ranks):
+        if ranks.rank == 0:
             paper = BytesIO()
             draw(paper)
             png = paper.getvalue()

@@ -9,6 +9,7 @@ import traceback
 from pathlib import Path
 from typing import Any
 
+from fenics_contact._base.launching import ranks_of
 from fenics_contact._base.libraries import MPI, start
 from fenics_contact.errors import FenicsContactError
 from fenics_contact.output.files import write_json
@@ -21,29 +22,31 @@ def main(comm: MPI.Comm | None, arguments: list[str] | None = None) -> None:
         not part of the measured time, and its memory is reported separately.
     """
     task = json.loads((sys.argv[1:] if arguments is None else arguments)[0])
+    ranks = ranks_of(comm)
     try:
-        record = _called(comm, task["function"], task["arguments"])
+        record = _called(comm, ranks, task["function"], task["arguments"])
     except FenicsContactError as error:  # raised by all ranks together
         record = {"failed": {"kind": type(error).__name__, "message": str(error)}}
     except Exception:
-        if comm is None:
+        if ranks.size == 1:
             raise
         # Other ranks may wait in a collective call that this one will never reach.
         traceback.print_exc()
         sys.stderr.flush()
-        comm.Abort(1)
+        ranks.Abort(1)
     write_json(Path(task["file"]), record, comm=comm)
 
 
-def _called(comm: MPI.Comm | None, function: str, arguments: dict[str, Any]) -> dict[str, Any]:
+def _called(
+    comm: MPI.Comm | None, ranks: MPI.Comm, function: str, arguments: dict[str, Any]
+) -> dict[str, Any]:
     module, _, name = function.partition(":")
     call = getattr(importlib.import_module(module), name)
     if comm is not None:
         start(comm)
     imports = peak_memory()
-    record = {"ranks": 1 if comm is None else comm.size, **call(comm, **arguments)}
-    both = (peak_memory(), imports)
-    peak, imports = both if comm is None else (comm.allreduce(bytes_) for bytes_ in both)
+    record = {"ranks": ranks.size, **call(comm, **arguments)}
+    peak, imports = (ranks.allreduce(bytes_) for bytes_ in (peak_memory(), imports))
     return {**record, "peak_memory": peak, "import_memory": imports}
 
 

@@ -66,7 +66,7 @@ def test_a_file_cut_anywhere_is_refused(path: Path) -> None:
     content = path.read_bytes()
     for length in np.linspace(0, len(content) - 1, 60).astype(int):
         path.write_bytes(content[:length])
-        with pytest.raises(InvalidInputError, match=r"is not a complete checkpoint.*restore a copy"):
+        with pytest.raises(InvalidInputError, match=r"is not a complete checkpoint.*restore or remove it"):
             read_archive(path, "test", PROBLEM)
 
 
@@ -165,6 +165,6 @@ def test_all_ranks_hear_of_what_rank_0_found(mpirun, tmp_path: Path) -> None:
             said += str(error)
         words = comm.gather(said)
         if comm.rank == 0:
-            print(sum("is one of a test" in each and "could not be written" in each for each in words))
+            print(sum("is of a test" in each and "could not be written" in each for each in words))
     """
     assert mpirun(script, 2).strip() == "2"

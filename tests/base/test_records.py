@@ -88,7 +88,7 @@ def test_a_step_says_how_far_its_residual_is_from_the_target() -> None:
         task = Task("solve", unit="products", target=1e-6)
         task.step(1, measure=2.5e-3)
         task.step(54, measure=8e-7)
-        task.step(60, measure=8e-7, target=2.5e-8, value=-1234.5)
+        Task("solve", unit="products", target=2.5e-8).step(60, measure=8e-7, value=-1234.5)
     assert [str(event) for event in collector.events] == [
         "solve: 1 product, residual 2.5e-03 > 1e-06",
         "solve: 54 products, residual 8.0e-07 ≤ 1e-06",
