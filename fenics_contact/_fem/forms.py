@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,7 +41,7 @@ from fenics_contact._fem.templates import (
 )
 from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.fields import Ufl, evaluate
-from fenics_contact._scene.loads import InitialStress, Load, PointForce, Pressure, ThermalStrain
+from fenics_contact._scene.loads import InitialStress, Load, Pressure, ThermalStrain
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import together
 from fenics_contact.materials.elastic import Material, Transverse, can_expand
@@ -83,7 +84,7 @@ class FormLibrary:
                 for material in body.materials:
                     self._check(material, body.element)
         for load in as_tractions(scene):
-            if isinstance(load, PointForce):
+            if load.at_points:
                 continue
             body = scene.bodies[load.body]
             for materials in material_sets(body):
@@ -297,24 +298,24 @@ class Temperature:
 
     @property
     def _numbers(self) -> list[float]:
-        return [load.value for load in self.loads if isinstance(load.value, float)]
+        return [number for load in self.loads for number in load.numbers]
 
     @property
     def _ufl(self) -> list[Any]:
-        return [load for load in self.loads if isinstance(load.value, Ufl)]
+        return [load for load in self.loads if load.is_ufl]
 
     @property
     def of_position(self) -> list[Any]:
         """The changes given as functions of position."""
-        return [load for load in self.loads if not isinstance(load.value, float | Ufl)]
+        return [load for load in self.loads if load.is_function]
 
 
 def temperature_of(loads: Iterable[Load], body: str) -> Temperature:
     """Return the temperature change of a body, and its initial stress."""
     mine = [load for load in loads if load.body == body]
     return Temperature(
-        tuple(load for load in mine if isinstance(load, ThermalStrain)),
-        tuple(load for load in mine if isinstance(load, InitialStress)),
+        tuple(chain.from_iterable(load.temperatures for load in mine)),
+        tuple(chain.from_iterable(load.stresses for load in mine)),
     )
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable
 from typing import Any
 
 import numpy as np
@@ -32,57 +31,25 @@ from fenics_contact.materials.hyperelastic import is_nonlinear
 FIRST_COUNT = 4
 
 
-@dataclass(frozen=True)
-class Kind:
-    """What the forms of one type of loads have in common.
-
-    `scalar`: whether values are; `cellwise`: whether they are given by cells; `of_materials`: whether the
-    form has the constants of materials, and is integrated over the cells of each; `work`: see `load_work`.
-    """
-
-    name: str
-    work: Callable[[Any, tuple[Material, ...], Element, Expr, Expr], tuple[ufl.Form, Constants]]
-    scalar: bool = False
-    cellwise: bool = False
-    of_materials: bool = False
-
-
-def kind_of(load: Load) -> Kind:
-    """Return the kind of a load's form."""
-    return KINDS.get(type(load), ON_SURFACE)
-
-
-def is_scalar(load: Load) -> bool:
-    """Return whether the value of a load is a scalar."""
-    return kind_of(load).scalar
-
-
 def load_name(load: Load, element: Element) -> tuple[str, str, str]:
     """Return the name of the form of a load: kind, type of its value, cell type."""
-    given = "UFL" if isinstance(load.value, Ufl) else "of position" if callable(load.value) else "numbers"
-    kind = kind_of(load).name + " on a region" * (region_of(load) is not None)
-    return (kind, given, element.name)
-
-
-def region_of(load: Load) -> str | None:
-    """Return the name of the region on which alone a load acts, None for others."""
-    return load.region if isinstance(load, BodyForce | InitialStress) else None
+    given = "UFL" if load.is_ufl else "of position" if load.is_function else "numbers"
+    return (load.kind + " on a region" * bool(load.on_region), given, element.name)
 
 
 def loaded_cells(
     load: Load, parts: Composition, body: Body, cells: np.ndarray
 ) -> dict[int, np.ndarray] | None:
     """Return the cells of one mesh by the tags of a load's form, None if it has none."""
-    region = region_of(load)
-    if region is not None and not kind_of(load).cellwise:
-        return {LOADED: np.flatnonzero(np.isin(cells, body.mesh.regions[region]))}
-    return parts.cells if kind_of(load).of_materials else None
+    if load.on_region and not load.by_cell:
+        return {LOADED: np.flatnonzero(np.isin(cells, body.mesh.regions[load.on_region]))}
+    return parts.cells if load.by_materials else None
 
 
 def load_key(load: Load, materials: tuple[Material, ...], element: Element) -> tuple[Hashable, ...]:
     """Return the key of everything on which the form of a load depends."""
-    own = load.value if isinstance(load.value, Ufl) else None
-    return (*load_name(load, element), element, own, materials if kind_of(load).of_materials else ())
+    own = load.value if load.is_ufl else None
+    return (*load_name(load, element), element, own, materials if load.by_materials else ())
 
 
 class Symbol:
@@ -93,30 +60,29 @@ class Symbol:
         width = element.components
         self.constants: Constants = ()
         self.coefficients: tuple[ufl.Coefficient, ...] = ()
-        if kind_of(load).cellwise:
+        if load.by_cell:
             space = element.cellwise((6,))
             self.expression = ufl.Coefficient(space, count=FIRST_COUNT + number)
             self.coefficients = (self.expression,)
         elif isinstance(load.value, Ufl):
             self.expression = from_ufl(load, load.value, element)
-        elif callable(load.value):
-            space = element.nodal if is_scalar(load) else element.displacements
+        elif load.is_function:
+            space = element.nodal if load.is_scalar else element.displacements
             self.expression = ufl.Coefficient(space, count=FIRST_COUNT + number)
             self.coefficients = (self.expression,)
         else:
-            self.constants = scalar_constants(element, 1 if is_scalar(load) else width)
-            self.expression = self.constants[0] if is_scalar(load) else ufl.as_vector(list(self.constants))
+            self.constants = scalar_constants(element, 1 if load.is_scalar else width)
+            self.expression = self.constants[0] if load.is_scalar else ufl.as_vector(list(self.constants))
 
 
 def from_ufl(load: Load, value: Ufl, element: Element) -> Expr:
     """Return a value given as `Ufl`, written on the template, after a check of its shape."""
-    width = element.components
-    shape = () if is_scalar(load) else (width,)
+    shape = load.width(element.components)
     with user_code(f"the function given as Ufl of {type(load).__name__} on body {load.body!r}"):
         result = value.function(element.x)
         result = ufl.as_vector(list(result)) if isinstance(result, list | tuple) else ufl.as_ufl(result)
     if result.ufl_shape != shape:
-        kind = "a scalar" if is_scalar(load) else f"a vector of {width} components"
+        kind = "a scalar" if load.is_scalar else f"a vector of {element.components} components"
         raise InvalidInputError(
             f"{type(load).__name__} on {load.body!r} needs shape {shape}, got {result.ufl_shape}: {kind}"
         )
@@ -125,9 +91,7 @@ def from_ufl(load: Load, value: Ufl, element: Element) -> Expr:
 
 def numbers_of(load: Load) -> tuple[float, ...]:
     """Return the values of a symbol's constants."""
-    if callable(load.value) or isinstance(load.value, Ufl) or kind_of(load).cellwise:
-        return ()
-    return tuple(load.value) if isinstance(load.value, Sequence) else (float(load.value),)
+    return () if load.by_cell else load.numbers
 
 
 def load_fields(
@@ -141,33 +105,32 @@ def load_fields(
 
     `acted`: marks of the nodes on the load's surface; the value is asked for only there.
     """
-    if kind_of(load).cellwise:
+    if load.by_cell:
         assert of_cells is not None
         return (_dolfinx.cell_field(space.mesh, "initial_stress", of_cells),)
-    if isinstance(load.value, Ufl) or not callable(load.value):
+    if not load.is_function:
         return ()
-    space = _dolfinx.scalar_space(space.mesh, 1) if is_scalar(load) else space
+    space = _dolfinx.scalar_space(space.mesh, 1) if load.is_scalar else space
     nodes, dofs = _dolfinx.node_dofs(space)
     width = int(space.dofmap.index_map_bs)
-    shape = () if is_scalar(load) else (width,)
     name = f"{type(load).__name__} on body {load.body!r}"
     here = np.arange(len(nodes)) if acted is None else np.flatnonzero(acted[nodes])
     field = _dolfinx.fem.Function(space, name="load")
-    given = evaluate(name, load.value, points[nodes[here]], shape)
+    given = evaluate(name, load.function, points[nodes[here]], load.width(width))
     field.x.array.reshape(-1, width)[dofs[here]] = given.reshape(-1, width)
     return (field,)
 
 
 def has_work(load: Load, materials: tuple[Material, ...]) -> bool:
     """Return whether a load has a form: nonlinear materials feel temperatures themselves."""
-    return not kind_of(load).of_materials or not all(map(is_nonlinear, materials))
+    return not load.by_materials or not all(map(is_nonlinear, materials))
 
 
 def load_work(
     load: Load, materials: tuple[Material, ...], element: Element, value: Expr, v: Expr
 ) -> tuple[ufl.Form, Constants]:
     """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it."""
-    return kind_of(load).work(load, materials, element, value, v)
+    return WORK.get(type(load), _surface_work)(load, materials, element, value, v)
 
 
 def _thermal_work(
@@ -197,7 +160,7 @@ def _body_work(
     load: BodyForce, materials: tuple[Material, ...], element: Element, value: Expr, v: Expr
 ) -> tuple[ufl.Form, Constants]:
     measure = volume_measure(element, 2)
-    measure = measure if load.region is None else measure(LOADED)
+    measure = measure(LOADED) if load.on_region else measure
     return element.integrand(ufl.dot(value, v)) * measure, ()
 
 
@@ -214,12 +177,12 @@ def _surface_work(
     return element.integrand(ufl.dot(value, v)) * surface_measure(element), ()
 
 
-ON_SURFACE = Kind("surface load", _surface_work)
-KINDS = {
-    BodyForce: Kind("body force", _body_work),
-    ThermalStrain: Kind("thermal strain", _thermal_work, scalar=True, of_materials=True),
-    InitialStress: Kind("initial stress", _stress_work, cellwise=True),
-    Pressure: Kind("pressure", _pressure_work, scalar=True),
+#: The virtual work of loads by their type; of all others it is that of forces on a surface.
+WORK: dict[type, Callable[[Any, tuple[Material, ...], Element, Expr, Expr], tuple[ufl.Form, Constants]]] = {
+    BodyForce: _body_work,
+    ThermalStrain: _thermal_work,
+    InitialStress: _stress_work,
+    Pressure: _pressure_work,
 }
 
 
@@ -230,4 +193,4 @@ def as_stress(vector: Expr) -> Expr:
 
 def load_parameters(load: Load, parts: Composition) -> tuple[float, ...]:
     """Return the values of the constants of a load's form: its own, then those of the materials."""
-    return numbers_of(load) + (parts.parameters if kind_of(load).of_materials else ())
+    return numbers_of(load) + (parts.parameters if load.by_materials else ())

@@ -16,7 +16,6 @@ from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._fem.load_forms import Symbol, load_fields, load_key, load_name, numbers_of
 from fenics_contact._fem.templates import Templates, Written, surface_measure
 from fenics_contact._kinematics.element import Element
-from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.loads import Load, Pressure, TotalForce, Traction
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.thickness import by_thickness, thickness_on
@@ -83,7 +82,7 @@ class FollowingPressure:
     ) -> None:
         """Bind the forms; arguments as in `FormLibrary.load`, of which the forms are prepared."""
         self._mesh = space.mesh
-        absolute = isinstance(load.value, Ufl) or not element.kinematics.is_homogeneous
+        absolute = load.is_ufl or not element.kinematics.is_homogeneous
         self._points = points if absolute else points - points[0]
         self._displacement = _dolfinx.fem.Function(space)
         fields = (self._displacement, *load_fields(load, space, points, acted))

@@ -18,7 +18,7 @@ from fenics_contact._large_deformations.rigid_surfaces import (
     TurnedSurface,
     tracked_motions,
 )
-from fenics_contact._scene.fields import Ufl, evaluate
+from fenics_contact._scene.fields import evaluate
 from fenics_contact._scene.loads import ThermalStrain
 from fenics_contact._scene.local_axes import free_matrix
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -350,7 +350,8 @@ def temperature_changes(scene: Scene, decomposition: Decomposition) -> tuple[np.
     found: list[np.ndarray | None] = []
     for mesh in decomposition.meshes:
         body = scene.bodies[mesh.body]
-        loads = [load for load in scene.loads if isinstance(load, ThermalStrain) and load.body == mesh.body]
+        mine = (load for load in scene.loads if load.body == mesh.body)
+        loads = [each for load in mine for each in load.temperatures]
         if not loads or not any(map(is_nonlinear, body.materials)):
             found.append(None)
             continue
@@ -361,14 +362,14 @@ def temperature_changes(scene: Scene, decomposition: Decomposition) -> tuple[np.
 
 def _change(load: ThermalStrain, points: np.ndarray) -> np.ndarray:
     """Return a change of temperature at points."""
-    if isinstance(load.value, Ufl):
+    if load.is_ufl:
         raise InvalidInputError(
             f"nonlinear materials need temperatures at nodes, the ThermalStrain on body {load.body!r} is "
             "given as Ufl: give a function of the points, or a number"
         )
-    if callable(load.value):
-        return evaluate(f"ThermalStrain on body {load.body!r}", load.value, points, ())
-    return np.full(len(points), float(load.value))
+    if load.is_function:
+        return evaluate(f"ThermalStrain on body {load.body!r}", load.function, points, ())
+    return np.full(len(points), load.numbers[0])
 
 
 @displayed

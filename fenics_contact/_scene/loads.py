@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import (
+    OfPosition,
     ScalarValue,
     Ufl,
     VectorValue,
@@ -28,10 +29,12 @@ from fenics_contact._scene.fields import (
     evaluate,
 )
 from fenics_contact._scene.part import Around, Part, body_of, require_nodes, require_surface, require_vector
+from fenics_contact._surfaces.facets import gauss_points, quadrature_areas
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import Transverse, can_expand
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import vector_areas
 
 
 class LoadPart(Part):
@@ -44,15 +47,103 @@ class LoadPart(Part):
 
     body: str
     value: Any
+    #: What its form is called.
+    kind = "surface load"
+    #: Whether it acts by the areas of a surface, through materials, or as a field constant on cells.
+    on_surface = by_materials = by_cell = False
+    #: Whether its value is one number.
+    is_scalar = False
+
+    @property
+    def on_region(self) -> str:
+        """Name of the region of its body on which alone it acts, empty if there is none."""
+        return ""
+
+    @property
+    def is_function(self) -> bool:
+        """Whether its value is a function of points."""
+        return callable(self.value)
+
+    @property
+    def function(self) -> OfPosition:
+        """Its value, if that is a function of points."""
+        return cast("OfPosition", self.value)
+
+    @property
+    def is_ufl(self) -> bool:
+        """Whether its value is written in UFL."""
+        return isinstance(self.value, Ufl)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Its value if it is given by numbers, else nothing."""
+        return () if self.is_function or self.is_ufl else tuple(np.atleast_1d(self.value).tolist())
+
+    @property
+    def in_words(self) -> str:
+        """What acts where."""
+        return f"{type(self).__name__} {self.body}"
+
+    def width(self, components: int) -> tuple[int, ...]:
+        """Return the shape of its value at a point of a body with so many components of displacement."""
+        return () if self.is_scalar else (components,)
+
+    def nodes_in(self, mesh: BodyMesh) -> np.ndarray:
+        """Return the nodes of the mesh of its body on which it acts, ascending."""
+        return np.arange(mesh.n_nodes)
+
+    def resultant(self, body: Body) -> np.ndarray | None:
+        """Return its resultant, [force]; None where no numbers give it, or the body has a thickness."""
+        return None if body.has_thickness or not self.numbers else self._total(body, np.array(self.value))
+
+    def _total(self, body: Body, value: np.ndarray) -> np.ndarray:
+        """Return the resultant of a value."""
+        return value
+
+    @property
+    def at_points(self) -> tuple[PointForce, ...]:
+        """The load, if it acts at single nodes."""
+        return ()
+
+    @property
+    def temperatures(self) -> tuple[ThermalStrain, ...]:
+        """The load, if it is a change of temperature."""
+        return ()
+
+    @property
+    def stresses(self) -> tuple[InitialStress, ...]:
+        """The load, if it is an initial stress."""
+        return ()
 
     def following(self, scene: Around) -> tuple[Pressure, ...]:
         """Return the load if it follows its surface."""
         return ()
 
 
+class SurfaceLoad(LoadPart):
+    """What acts on a surface.
+
+    Attributes:
+        surface: Name of the surface of its body.
+    """
+
+    surface: str
+    effect = EffectName.SURFACE_LOAD
+    on_surface = True
+
+    @property
+    def in_words(self) -> str:
+        """What acts where."""
+        return f"{super().in_words} {self.surface}"
+
+    def nodes_in(self, mesh: BodyMesh) -> np.ndarray:
+        """Return the nodes of its surface, ascending."""
+        return mesh.nodes_of(self.surface)
+
+
 @dataclass(frozen=True)
 @checked("value")
-class Traction(LoadPart):
+class Traction(SurfaceLoad):
     """Dead surface load.
 
     Attributes:
@@ -66,7 +157,6 @@ class Traction(LoadPart):
         >>> rising = Traction("block", "z1", lambda x: -10.0 * x[:, :1] * (0.0, 0.0, 1.0))
     """
 
-    effect = EffectName.SURFACE_LOAD
     body: str
     surface: str
     value: VectorValue
@@ -74,6 +164,11 @@ class Traction(LoadPart):
     def __post_init__(self) -> None:
         """Reject a value that is not a vector."""
         object.__setattr__(self, "value", checked_vector("Traction.value", self.value))
+
+    def _total(self, body: Body, value: np.ndarray) -> np.ndarray:
+        """Return the resultant of a value."""
+        facets = body.mesh.surfaces[self.surface]
+        return value * float(quadrature_areas(body.mesh.points, facets, body.kinematics.measure).sum())
 
     def check(self, scene: Around) -> None:
         """Reject a vector of another space, and a surface without an area."""
@@ -85,7 +180,7 @@ class Traction(LoadPart):
 
 @dataclass(frozen=True)
 @checked("value")
-class TotalForce(LoadPart):
+class TotalForce(SurfaceLoad):
     """Dead surface load given by its resultant, spread over the surface of the undeformed body.
 
     Without ``moment`` and ``at`` it is an even traction. With them the traction is a + b × (x − c), c being
@@ -106,7 +201,6 @@ class TotalForce(LoadPart):
         >>> eccentric = TotalForce("bracket", "plate", (0.0, 0.0, -500.0), at=(40.0, 0.0, 10.0))
     """
 
-    effect = EffectName.SURFACE_LOAD
     body: str
     surface: str
     value: GivenVector
@@ -172,7 +266,7 @@ def _numbers(name: str, given: GivenVector | float) -> GivenVector | float:
 
 @dataclass(frozen=True)
 @checked("value")
-class Pressure(LoadPart):
+class Pressure(SurfaceLoad):
     """Load normal to a surface; positive presses on the body, traction = −p n.
 
     On a body of a material for large deformations it follows the surface, f = −p cof F N per undeformed area:
@@ -190,7 +284,8 @@ class Pressure(LoadPart):
         >>> weight_of_snow = Pressure("membrane", "top", 1e-3, dead=True)
     """
 
-    effect = EffectName.SURFACE_LOAD
+    kind = "pressure"
+    is_scalar = True
     body: str
     surface: str
     value: ScalarValue
@@ -207,6 +302,15 @@ class Pressure(LoadPart):
     def following(self, scene: Around) -> tuple[Pressure, ...]:
         """Return it if it follows its surface, as on bodies that deform much, else nothing."""
         return (self,) if scene.bodies[self.body].deforms_much and not self.dead else ()
+
+    def _total(self, body: Body, value: np.ndarray) -> np.ndarray:
+        """Return the resultant of a value."""
+        points, facets = body.mesh.points, body.mesh.surfaces[self.surface]
+        measure = body.kinematics.measure
+        if measure.varies:
+            normals = sum(at.normals.sum(axis=0) for at in gauss_points(points, facets, measure))
+            return np.asarray(-value * normals)
+        return np.asarray(-value * vector_areas(points, facets).sum(axis=0))
 
     def check(self, scene: Around) -> None:
         """Reject a surface without an area."""
@@ -225,6 +329,7 @@ class BodyForce(LoadPart):
         region: Name of the region of its mesh that is loaded; all of the body by default.
     """
 
+    kind = "body force"
     effect = EffectName.BODY_FORCE
     body: str
     value: VectorValue
@@ -233,6 +338,15 @@ class BodyForce(LoadPart):
     def __post_init__(self) -> None:
         """Reject a value that is not a vector."""
         object.__setattr__(self, "value", checked_vector("BodyForce.value", self.value))
+
+    def _total(self, body: Body, value: np.ndarray) -> np.ndarray:
+        """Return the resultant of a value."""
+        return value * body.volume_of(self.region)
+
+    @property
+    def on_region(self) -> str:
+        """Name of the region of its body on which alone it acts, empty if there is none."""
+        return self.region or ""
 
     def check(self, scene: Around) -> None:
         """Reject a vector of another space, an unknown region and an axis that the body does not have."""
@@ -266,6 +380,8 @@ class ThermalStrain(LoadPart):
             are nonlinear.
     """
 
+    kind = "thermal strain"
+    is_scalar = by_materials = True
     effect = EffectName.THERMAL_STRAIN
     body: str
     temperature_change: ScalarValue
@@ -274,6 +390,15 @@ class ThermalStrain(LoadPart):
         """Reject a value that is not a scalar."""
         value = checked_scalar("ThermalStrain.temperature_change", self.temperature_change)
         object.__setattr__(self, "temperature_change", value)
+
+    def resultant(self, body: Body) -> np.ndarray:
+        """Return zero."""
+        return np.zeros(body.mesh.dim)
+
+    @property
+    def temperatures(self) -> tuple[ThermalStrain, ...]:
+        """Itself."""
+        return (self,)
 
     def check(self, scene: Around) -> None:
         """Reject materials that do not expand."""
@@ -313,6 +438,8 @@ class InitialStress(LoadPart):
         >>> rolled = InitialStress("bar", lambda x: np.outer(x[:, 2] ** 2 - 8.3, (12.0, 0, 0, 0, 0, 0)))
     """
 
+    kind = "initial stress"
+    by_cell = True
     effect = EffectName.INITIAL_STRESS
     body: str
     value: VectorValue
@@ -329,6 +456,24 @@ class InitialStress(LoadPart):
         if not callable(value):
             check_row(value, "InitialStress.value", 6)
             object.__setattr__(self, "value", floats(np.asarray(value, dtype=np.float64)))
+
+    def resultant(self, body: Body) -> np.ndarray:
+        """Return zero."""
+        return np.zeros(body.mesh.dim)
+
+    @property
+    def stresses(self) -> tuple[InitialStress, ...]:
+        """Itself."""
+        return (self,)
+
+    def width(self, components: int) -> tuple[int, ...]:
+        """Return the shape of its value at a point: six numbers."""
+        return (6,)
+
+    @property
+    def on_region(self) -> str:
+        """Name of the region of its body on which alone it acts, empty if there is none."""
+        return self.region or ""
 
     def check(self, scene: Around) -> None:
         """Reject nonlinear materials, an unknown region and numbers for components that are zero."""
@@ -407,6 +552,19 @@ class PointForce(LoadPart):
             )
         object.__setattr__(self, "value", value)
 
+    def nodes_in(self, mesh: BodyMesh) -> np.ndarray:
+        """Return its nodes in the mesh of its body, ascending."""
+        return mesh.nodes_of(self.nodes)
+
+    def _total(self, body: Body, value: np.ndarray) -> np.ndarray:
+        """Return the resultant of a value."""
+        return value * len(self.nodes_in(body.mesh))
+
+    @property
+    def at_points(self) -> tuple[PointForce, ...]:
+        """Itself."""
+        return (self,)
+
     def check(self, scene: Around) -> None:
         """Reject nodes that are not there, and a vector of another space."""
         require_nodes(scene, self.body, self.nodes, "PointForce")
@@ -425,12 +583,8 @@ class PointForce(LoadPart):
         return np.tile(np.asarray(self.value, dtype=np.float64), (len(points), 1))
 
 
-#: What acts on a surface.
-SurfaceLoad = Traction | TotalForce | Pressure
-#: What acts in the volume of a body.
-VolumeLoad = BodyForce | ThermalStrain | InitialStress
 #: Any load of a scene.
-Load = SurfaceLoad | VolumeLoad | PointForce
+Load = Traction | TotalForce | Pressure | BodyForce | ThermalStrain | InitialStress | PointForce
 
 
 def require_region(load: BodyForce | InitialStress, mesh: BodyMesh) -> None:

@@ -13,20 +13,11 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._scene.discretisation import in_words
-from fenics_contact._scene.loads import (
-    BodyForce,
-    InitialStress,
-    Load,
-    PointForce,
-    Pressure,
-    ThermalStrain,
-    TotalForce,
-)
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.sectors import AnyTie
-from fenics_contact._surfaces.facets import FacetedSurface, gauss_points, heights, quadrature_areas
+from fenics_contact._surfaces.facets import FacetedSurface, heights, quadrature_areas
 from fenics_contact._surfaces.projection import project
 from fenics_contact.materials.elastic import PlaneStress, isotropic_constants
 from fenics_contact.materials.kernels import rigid_body_modes
@@ -59,7 +50,7 @@ def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
     """
     total = {name: np.zeros(scene.dim) for name in scene.body_names}
     for load in scene.loads:
-        resultant = _resultant(scene, load)
+        resultant = load.resultant(scene.bodies[load.body])
         if resultant is None:
             return None
         total[load.body] += resultant[: scene.dim]
@@ -67,29 +58,6 @@ def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
         if scene.bodies[surface.body].is_rigid:
             total[surface.body] += surface.load[: scene.dim]
     return max(abs(float(force @ normal)) for force in total.values())
-
-
-def _resultant(scene: SceneParts, load: Load) -> np.ndarray | None:
-    """Return the resultant of a load that is given by numbers, shape (dim,), [force]."""
-    if isinstance(load, ThermalStrain | InitialStress):
-        return np.zeros(scene.dim)
-    if scene.has_thickness or callable(load.value) or not isinstance(load.value, float | tuple):
-        return None
-    body, value = scene.bodies[load.body], np.array(load.value)
-    if isinstance(load, TotalForce):
-        return value
-    if isinstance(load, PointForce):
-        return value * len(body.mesh.nodes_of(load.nodes))
-    if isinstance(load, BodyForce):
-        return value * body.volume_of(load.region)
-    points, facets = body.mesh.points, body.mesh.surfaces[load.surface]
-    measure = body.kinematics.measure
-    if isinstance(load, Pressure) and measure.varies:
-        normals = sum(at.normals.sum(axis=0) for at in gauss_points(points, facets, measure))
-        return np.asarray(-value * normals)
-    if isinstance(load, Pressure):
-        return np.asarray(-value * vector_areas(points, facets).sum(axis=0))
-    return value * float(quadrature_areas(points, facets, measure).sum())
 
 
 def modulus_of(scene: SceneParts, pair: ContactPair) -> float | None:

@@ -107,10 +107,7 @@ class Scene(SceneParts):
             "bodies": {name: body.in_words for name, body in self.bodies.items()},
             "nodes": f"{sum(body.mesh.n_nodes for body in self.bodies.values())} in {self.dim} dimensions",
             "supports": [support.in_words for support in self.supports],
-            "loads": [
-                f"{type(load).__name__} {load.body} {getattr(load, 'surface', '')}".rstrip()
-                for load in self.loads
-            ],
+            "loads": [load.in_words for load in self.loads],
             "contacts": [
                 f"{pair.place}, {pair.friction or 'without friction'}, {pair.given_gap}".removesuffix(", ")
                 for pair in self.contacts

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
 from fenics_contact import _dolfinx
-from fenics_contact._fem.load_forms import is_scalar, load_fields, load_parameters, loaded_cells
+from fenics_contact._fem.load_forms import load_fields, load_parameters, loaded_cells
 from fenics_contact._fem.loads import LinearTraction, spread_traction
-from fenics_contact._scene.fields import OfPosition, gradients_of
+from fenics_contact._scene.fields import gradients_of
 from fenics_contact._scene.loads import Load, PointForce, SurfaceLoad, TotalForce
 from fenics_contact._surfaces.facets import GaussPoint, gauss_points, surface_moments
 from fenics_contact.design.forms import ShapeForms, sets_in_use, sum_over_subdomains
@@ -36,15 +35,14 @@ def field_by_places(
     chosen = np.ones(len(nodes), dtype=bool)
     if moving is not None:
         chosen &= moving[torn.decomposition.tearing.global_nodes(mesh.body, nodes)]
-    if isinstance(load, SurfaceLoad):
-        chosen &= np.isin(nodes, mesh_of_body.surfaces[load.surface])
+    if load.on_surface:
+        chosen &= np.isin(nodes, load.nodes_in(mesh_of_body))
     inputs, dofs = _dolfinx.node_dofs(space)
     _, own_dofs = _dolfinx.node_dofs(mesh.space)
     here = chosen[inputs]
-    shape = () if is_scalar(load) else (dim,)
     places = mesh_of_body.points[nodes[inputs[here]]]
-    function, name = cast(OfPosition, load.value), f"{type(load).__name__} on body {load.body!r}"
-    slope = gradients_of(name, function, places, shape)
+    function, name = load.function, f"{type(load).__name__} on body {load.body!r}"
+    slope = gradients_of(name, function, places, load.width(dim))
     weight = by_values.reshape(len(nodes), -1)[dofs[here]]
     result = np.zeros((len(nodes), dim))
     result[own_dofs[here]] = np.einsum("nc,ncd->nd", weight, slope.reshape(*weight.shape, dim))
@@ -199,7 +197,7 @@ def _load_by_shape(
         facets = mesh.facets_of(body, load.surface)
         if len(facets[0]) == 0:
             return np.zeros(mesh.size)
-        acted = np.isin(nodes, body.mesh.surfaces[load.surface])
+        acted = np.isin(nodes, load.nodes_in(body.mesh))
     cells = loaded_cells(load, parts, body, mesh.cells)
     fields = load_fields(load, mesh.space, body.mesh.points[nodes], acted)
     values, given = load_parameters(load, parts), [*functions, *fields]
@@ -218,12 +216,11 @@ def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
     tearing, bodies = torn.decomposition.tearing, torn.scene.bodies
 
     def moves(load: Load) -> bool:
-        mesh = bodies[load.body].mesh
-        nodes = mesh.surfaces[load.surface] if isinstance(load, SurfaceLoad) else np.arange(mesh.n_nodes)
+        nodes = load.nodes_in(bodies[load.body].mesh)
         return moving is None or bool(moving[tearing.global_nodes(load.body, nodes)].any())
 
     found = [load for load in torn.scene.loads if moves(load)]
-    if any(isinstance(load, PointForce) and callable(load.value) for load in found):
+    if any(each.is_function for load in found for each in load.at_points):
         raise InvalidInputError(
             "derivatives by the shape need forces at nodes as numbers, got a function of the points: give a "
             "PointForce for each value"

@@ -13,7 +13,6 @@ from ufl.core.expr import Expr
 
 from fenics_contact._base.checks import GivenVector, checked, unit_vector
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact._scene.loads import ThermalStrain
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
@@ -165,7 +164,7 @@ class StrainEnergy(Weighable):
     def value(self, state: State, forms: ShapeForms) -> float:
         """Return the strain energy; raises as `require_linear` does."""
         require_linear(state, self)
-        if any(isinstance(load, ThermalStrain) for load in state.scene.loads):
+        if any(load.temperatures for load in state.scene.loads):
             raise InvalidInputError(
                 "StrainEnergy needs a scene without ThermalStrain, whose strain stores no energy, got one: "
                 "integrate a density of your own by VolumeIntegral"

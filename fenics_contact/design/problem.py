@@ -15,7 +15,6 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.problem import ContactProblem
-from fenics_contact._scene.loads import InitialStress, ThermalStrain
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.adjoint import WeakChoice, linearise_face, require_from_rest
 from fenics_contact.design.base import SingleProblem, comm_of, with_fewest_weak_points, with_objective
@@ -102,7 +101,7 @@ def _check_differentiable(scene: Scene) -> None:
             "designs need bodies without torsion, this scene has torsion=True: optimise it with a tool that "
             "takes plain functions, see fenics_contact.SceneResponse, or leave torsion out"
         )
-    if any(isinstance(load, InitialStress) for load in scene.loads):
+    if any(load.stresses for load in scene.loads):
         raise InvalidInputError(
             "designs need bodies without an InitialStress, whose cells would carry it along, this scene has "
             "one: leave it out"
@@ -122,7 +121,7 @@ def _check_differentiable(scene: Scene) -> None:
             has_mean_dilatation(each) for body in scene.bodies.values() for each in body.materials
         ),
         "pressures that do not follow their surfaces": bool(scene.following_pressures),
-        "bodies without ThermalStrain": any(isinstance(load, ThermalStrain) for load in scene.loads),
+        "bodies without ThermalStrain": any(load.temperatures for load in scene.loads),
     }
     for needed, missing in reasons.items():
         if missing:

@@ -8,11 +8,10 @@ import numpy as np
 
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.load_forms import is_scalar
-from fenics_contact._scene.fields import Ufl, evaluate
-from fenics_contact._scene.loads import InitialStress, PointForce, SurfaceLoad
+from fenics_contact._scene.fields import evaluate
+from fenics_contact._scene.loads import Load
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.supports import Roller, Support
+from fenics_contact._scene.supports import AnySupport
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import user_code
 
@@ -43,28 +42,22 @@ def _values(scene: Scene) -> dict[str, str]:
                 numbers = np.asarray(material.parameters, dtype=np.float64)
             descriptions.update(described(numbers.tolist(), f"parameters of {kind} in body {name!r}"))
     for number, support in enumerate(scene.supports):
-        if isinstance(support, Roller) and callable(support.displacement):
-            values = support.amounts(_nodes(scene, support))
-            descriptions.update(described(values, f"scene.supports[{number}] at some nodes"))
-        if isinstance(support, Support) and any(callable(component) for component in support.value):
-            values = support.values(_nodes(scene, support))
+        if support.varies:
+            values = support.values(_some(support, scene))
             descriptions.update(described(values, f"scene.supports[{number}] at some nodes"))
     for number, load in enumerate(scene.loads):
-        if callable(load.value) and not isinstance(load.value, Ufl):
-            points, width = _nodes(scene, load), 6 if isinstance(load, InitialStress) else scene.components
-            shape = () if is_scalar(load) else (width,)
-            values = evaluate(f"{type(load).__name__} on body {load.body!r}", load.value, points, shape)
+        if load.is_function:
+            name, shape = f"{type(load).__name__} on body {load.body!r}", load.width(scene.components)
+            values = evaluate(name, load.function, _some(load, scene), shape)
             descriptions.update(described(values, f"scene.loads[{number}] at some nodes"))
     return descriptions
 
 
-def _nodes(scene: Scene, part: Any, compared: int = 8) -> np.ndarray:
+def _some(part: AnySupport | Load, scene: Scene, compared: int = 8) -> np.ndarray:
     """Return the coordinates of some nodes that a load or support acts on, shape (n, dim).
 
     `compared`: number of nodes at which functions are compared: different functions differ nearly everywhere.
     """
     mesh = scene.bodies[part.body].mesh
-    nodes = np.arange(mesh.n_nodes)
-    if isinstance(part, Support | Roller | SurfaceLoad | PointForce):
-        nodes = mesh.nodes_of(part.nodes if isinstance(part, PointForce) else part.surface)
+    nodes = part.nodes_in(mesh)
     return mesh.points[nodes[np.linspace(0, len(nodes) - 1, min(compared, len(nodes))).astype(int)]]

@@ -15,18 +15,15 @@ from fenics_contact import _dolfinx
 from fenics_contact._base.display import displayed
 from fenics_contact._fem.composition import Composition, composition
 from fenics_contact._fem.forms import FormLibrary
-from fenics_contact._fem.load_forms import has_work, loaded_cells, region_of
+from fenics_contact._fem.load_forms import has_work, loaded_cells
 from fenics_contact._fem.model_checks import check_kernel, kernel_of
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import (
-    InitialStress,
     Load,
     PointForce,
     SurfaceLoad,
-    ThermalStrain,
     initial_stress,
 )
 from fenics_contact.errors import InvalidInputError
@@ -364,10 +361,9 @@ def assemble(
         return earlier
     force = np.zeros(mesh.size)
     for load in acting:
-        if isinstance(load, PointForce):
-            force += _at_points(load, mesh, body)
-            continue
-        if not has_work(load, parts.materials):
+        for forces in load.at_points:
+            force += _at_points(forces, mesh, body)
+        if load.at_points or not has_work(load, parts.materials):
             continue
         facets, acted = None, None
         if isinstance(load, SurfaceLoad):
@@ -375,9 +371,9 @@ def assemble(
             acted = mesh.acted(body.mesh.surfaces[load.surface])
         places = mesh.by_input_node(points)
         cells, of_cells = loaded_cells(load, parts, body, mesh.cells), None
-        if isinstance(load, InitialStress):
-            of_cells = initial_stress([load], body)[mesh.cells]
-        absolute = isinstance(load.value, Ufl) or _varies(parts, body, forms)
+        for stress in load.stresses:
+            of_cells = initial_stress([stress], body)[mesh.cells]
+        absolute = load.is_ufl or _varies(parts, body, forms)
         coordinates = places if absolute else _from_own_origin(places)
         _dolfinx.update_coordinates(mesh.space.mesh, coordinates)
         for thickness, on in _by_thickness(load, mesh, body, facets):
@@ -394,13 +390,12 @@ def _by_thickness(
     load: Load, mesh: SubdomainMesh, body: Body, facets: _Facets
 ) -> Iterator[tuple[float, _Facets]]:
     """Yield the thicknesses of what a load acts on, and its facets there; ones without a thickness."""
-    if isinstance(load, ThermalStrain) or not body.has_thickness:
+    if load.by_materials or not body.has_thickness:
         yield 1.0, facets  # the material has it
         return
     thickness = body.thickness_of_cells
     if facets is None:
-        region = region_of(load)
-        yield float(thickness[0 if region is None else body.mesh.regions[region][0]]), None
+        yield float(thickness[body.mesh.regions[load.on_region][0] if load.on_region else 0]), None
         return
     here = thickness[mesh.cells[facets[0]]]
     for each in np.unique(here):
@@ -423,11 +418,10 @@ def _at_points(load: PointForce, mesh: SubdomainMesh, body: Body) -> np.ndarray:
 def _acts(load: Load, mesh: SubdomainMesh, body: Body) -> bool:
     if load.body != mesh.body:
         return False
-    if isinstance(load, PointForce):
-        return bool(np.isin(body.mesh.nodes_of(load.nodes), mesh.nodes).any())
-    region = region_of(load)
-    if region is not None:
-        return bool(np.isin(mesh.cells, body.mesh.regions[region]).any())
+    if load.at_points:
+        return bool(np.isin(load.nodes_in(body.mesh), mesh.nodes).any())
+    if load.on_region:
+        return bool(np.isin(mesh.cells, body.mesh.regions[load.on_region]).any())
     return not isinstance(load, SurfaceLoad) or len(mesh.facets_of(body, load.surface)[0]) > 0
 
 
