@@ -416,7 +416,7 @@ class MovedContact(ContactConfiguration):
         """
         torn, points = self.torn, self.torn.points
         across = np.einsum("nad,nd->na", points.tangents**2, points.symmetric) > 0.5
-        along = np.einsum("nad,npd->nap", points.tangents, points.tilted)
+        along = np.einsum("nad,npd->nap", points.tangents, points.oblique_normals)
         across |= np.max(along**2, axis=2, initial=0.0) > 0.5
         held = np.zeros_like(across)
         held[torn.frictional] = torn.groups.slips.held(torn.decomposition.fixed).reshape(

@@ -37,7 +37,7 @@ def on_masters(points: ContactPoints, scene: Scene, body: str, means: bool) -> C
     there = point_of[numbers.global_nodes(body, hanging.masters)]
     leaves = (mine >= 0) & (there >= 0).any(axis=1)
     alone = mine[(mine >= 0) & ~leaves]
-    if points.turned.any() and (len(alone) or (means and leaves.any())):
+    if points.are_rotated.any() and (len(alone) or (means and leaves.any())):
         raise InvalidInputError(
             f"sides of sectors by mortar must have no hanging nodes, that of body {body!r} has some: refine "
             "the cells at its sides evenly"

@@ -368,7 +368,7 @@ def _put(points: ContactPoints, scene: Scene, which: np.ndarray) -> ContactPoint
     """Return points of which some measure the distance inside facets of their slaves."""
     own, master, symmetric = points.own.tolil(), points.master.tolil(), points.symmetric.copy()
     normal, gap, distance = points.normal.copy(), points.gap.copy(), points.distance.copy()
-    tilted, dim = points.tilted.copy(), points.normal.shape[1]
+    oblique, dim = points.oblique_normals.copy(), points.normal.shape[1]
     for number in np.unique(points.pair[which]):
         chosen = which[points.pair[which] == number]
         inside = InsideOf.of(scene, scene.contacts[int(number)])
@@ -377,8 +377,8 @@ def _put(points: ContactPoints, scene: Scene, which: np.ndarray) -> ContactPoint
         own[chosen], master[chosen], normal[chosen] = met.own, met.master, met.normal
         gap[chosen] = distance[chosen] = met.distance
         symmetric[chosen] = cut[:, :dim]
-        tilted[chosen] = cut[:, dim:, None] * inside.slave.planes[dim:]
+        oblique[chosen] = cut[:, dim:, None] * inside.slave.planes[dim:]
     return replace(
         points, own=own.tocsr(), master=master.tocsr(), normal=normal, gap=gap, distance=distance,
-        symmetric=symmetric, tilted=tilted,
+        symmetric=symmetric, oblique_normals=oblique,
     )  # fmt: skip

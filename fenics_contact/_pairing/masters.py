@@ -93,7 +93,7 @@ class Slave:
         return ContactPoints.at_nodes(
             pair, self.nodes[chosen], weight, normal, gap, surface.point_areas[chosen],
             length=surface.sizes[chosen] if surface.measure.varies else None,
-            taken=sp.csr_matrix((len(chosen), self.n_pairs), dtype=np.int64),
+            merged_nodes=sp.csr_matrix((len(chosen), self.n_pairs), dtype=np.int64),
         )  # fmt: skip
 
 
@@ -505,8 +505,8 @@ class SectorMaster(TiedMaster):
     def points(self, slave: Slave, search: Search) -> ContactPoints:
         """Return points with the rotation of the master's displacement. Collective."""
         points = super().points(slave, search)
-        turns = np.tile(self.pair.matrix(self.angle), (points.count, 1, 1))
-        return replace(points.as_turned(), turns=turns)
+        rotations = np.tile(self.pair.matrix(self.angle), (points.count, 1, 1))
+        return replace(points.as_rotated(), rotations=rotations)
 
     def _check(self, slave: Slave, search: Search) -> None:
         """Reject sides that are not one surface."""

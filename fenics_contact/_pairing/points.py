@@ -52,7 +52,7 @@ class ContactPoints:
         axes: Coordinate axis nearest to the first tangent, as a unit vector, shape (n, dim).
         symmetric: Components normal to a plane of symmetry that cuts both surfaces there, or the one on an
             obstacle: the mirror images move opposite, so that there is no slip across the plane, shape (n,
-            dim). Other planes are `tilted`.
+            dim). Other planes are `oblique_normals`.
         distance: Measured distance of the surfaces along the normal, positive when apart, shape (n,),
             [length].
         given: Whether the pair says what the gap is, by a value or by declaring the measured overlap an
@@ -61,10 +61,10 @@ class ContactPoints:
             but for points inside a facet, where a master that is narrower than the cells presses.
         slave_facet: Which facet of the slave that is, −1 for points at nodes, shape (n,).
         slave_local: Local coordinates on it, shape (n, dim − 1).
-        tilted: Unit normals of planes of symmetry that are not normal to an axis, as `symmetric`, zero where
-            a plane does not cut a point, shape (n, n_planes, dim).
-        taken: Slave nodes plus one of other contact pairs that have a point in the same place, which is left
-            out, on a surface beside: their areas are part of that of the point. Shape (n, n_pairs).
+        oblique_normals: Unit normals of planes of symmetry that are not normal to an axis, as `symmetric`,
+            zero where a plane does not cut a point, shape (n, n_planes, dim).
+        merged_nodes: Slave nodes plus one of other contact pairs that have a point in the same place, which
+            is left out, on a surface beside: their areas are part of that of the point. Shape (n, n_pairs).
         length: `sizes` on bodies of revolution, shape (n,), [length]; None elsewhere, where areas give them.
     """
 
@@ -84,8 +84,8 @@ class ContactPoints:
     own: sp.csr_matrix
     slave_facet: np.ndarray
     slave_local: np.ndarray
-    tilted: np.ndarray
-    taken: sp.csr_matrix
+    oblique_normals: np.ndarray
+    merged_nodes: sp.csr_matrix
     length: np.ndarray | None = None
 
     @classmethod
@@ -106,8 +106,8 @@ class ContactPoints:
             "tangents": tangent_frames(normal, axes), "facet": none, "local": np.zeros((count, dim - 1)),
             "axes": axes, "symmetric": np.zeros((count, dim), dtype=bool), "distance": gap,
             "given": np.zeros(count, dtype=bool), "own": at_nodes, "slave_facet": none,
-            "slave_local": np.zeros((count, dim - 1)), "tilted": np.zeros((count, 0, dim)),
-            "taken": sp.csr_matrix((count, 0), dtype=np.int64),
+            "slave_local": np.zeros((count, dim - 1)), "oblique_normals": np.zeros((count, 0, dim)),
+            "merged_nodes": sp.csr_matrix((count, 0), dtype=np.int64),
         }  # fmt: skip
         parts = {"pair": pair, "slave": slave, "master": master, "normal": normal, "gap": gap, "area": area}
         return cls(**parts, **(values | more))
@@ -135,9 +135,9 @@ class ContactPoints:
         `values`: A value for each point, shape (n,).
         """
         mine = np.flatnonzero(self.pair == pair)
-        if not self.taken.nnz:
+        if not self.merged_nodes.nnz:
             return self.slave[mine], values[mine]
-        other = self.taken[:, [pair]].tocoo()
+        other = self.merged_nodes[:, [pair]].tocoo()
         nodes = np.concatenate([self.slave[mine], other.data - 1])
         order = np.argsort(nodes)
         return nodes[order], np.concatenate([values[mine], values[other.row]])[order]
@@ -158,7 +158,7 @@ class ContactPoints:
         return (self.own - self.master).tocsr()
 
     @property
-    def turned(self) -> np.ndarray:
+    def are_rotated(self) -> np.ndarray:
         """Which points compare displacements with those of a master that are turned, shape (n,)."""
         return np.zeros(self.count, dtype=bool)
 
@@ -191,49 +191,48 @@ class ContactPoints:
         row = row[order]
         return row, jump.indices[order], jump.data[order], directions[row]
 
-    def as_turned(self) -> TurnedPoints:
+    def as_rotated(self) -> RotatedPoints:
         """Return the points with rotations that are none."""
         count, dim = self.normal.shape
         values = {each.name: getattr(self, each.name) for each in fields(self)}
-        return TurnedPoints(**values, turns=np.tile(np.eye(dim), (count, 1, 1)))
+        return RotatedPoints(**values, rotations=np.tile(np.eye(dim), (count, 1, 1)))
 
 
 @displayed
 @dataclass(frozen=True, kw_only=True)
-class TurnedPoints(ContactPoints):
+class RotatedPoints(ContactPoints):
     """Points of which some compare both sides of sectors.
 
     Attributes:
-        turns: Rotations R of the master's displacement in that of the slave less R times that of the master,
-            shape (n, dim, dim).
+        rotations: R in the slave's displacement less R times that of the master, shape (n, dim, dim).
     """
 
-    turns: np.ndarray
+    rotations: np.ndarray
 
     @property
-    def turned(self) -> np.ndarray:
+    def are_rotated(self) -> np.ndarray:
         """Which points lie on sides of sectors, shape (n,)."""
-        return np.asarray((self.turns != np.eye(self.turns.shape[1])).any(axis=(1, 2)))
+        return np.asarray((self.rotations != np.eye(self.rotations.shape[1])).any(axis=(1, 2)))
 
     def onto_slave(self, which: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         """Return vectors at masters, turned."""
-        return np.asarray(np.einsum("nde,ne->nd", self.turns[which], vectors))
+        return np.asarray(np.einsum("nde,ne->nd", self.rotations[which], vectors))
 
     def relative(self, values: np.ndarray, nodes: slice = slice(None)) -> np.ndarray:
         """Return slave minus turned master displacement."""
         flat, shape = values.reshape(len(values), -1), (self.count, *values.shape[1:])
         own, theirs = (np.asarray(part[:, nodes] @ flat).reshape(shape) for part in (self.own, self.master))
-        return np.asarray(own - np.einsum("nde,ne...->nd...", self.turns, theirs))
+        return np.asarray(own - np.einsum("nde,ne...->nd...", self.rotations, theirs))
 
     def on_nodes(self, force: np.ndarray) -> np.ndarray:
         """Return forces on all nodes."""
-        back = np.einsum("nde,nd->ne", self.turns, force)
+        back = np.einsum("nde,nd->ne", self.rotations, force)
         return np.asarray(self.own.T @ force - self.master.T @ back)
 
     def entries(self, which: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the entries of rows, those of slaves and of masters."""
         parts = self.own[which], -self.master[which]
-        back = np.einsum("nde,nd->ne", self.turns[which], directions)
+        back = np.einsum("nde,nd->ne", self.rotations[which], directions)
         rows = [np.repeat(np.arange(len(which)), np.diff(part.indptr)) for part in parts]
         along = np.concatenate([directions[rows[0]], back[rows[1]]])
         row, node = np.concatenate(rows), np.concatenate([part.indices for part in parts])
@@ -241,7 +240,7 @@ class TurnedPoints(ContactPoints):
         weight = np.concatenate([part.data for part in parts])
         return row[order], node[order], weight[order], along[order]
 
-    def as_turned(self) -> TurnedPoints:
+    def as_rotated(self) -> RotatedPoints:
         """Return the points."""
         return self
 
@@ -254,17 +253,18 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
         return ContactPoints.at_nodes(integer, integer, none, np.zeros((0, dim)), real, real)
     if len(parts) == 1:
         return parts[0]
-    names = [each.name for each in fields(parts[0]) if each.name not in {"length", "tilted"}]
+    names = [each.name for each in fields(parts[0]) if each.name not in {"length", "oblique_normals"}]
     values = {name: [getattr(part, name) for part in parts] for name in names}
     joined = {
         name: sp.vstack(each, format="csr") if sp.issparse(each[0]) else np.concatenate(each)
         for name, each in values.items()
     }
-    most = max(part.tilted.shape[1] for part in parts)
-    padded = [np.pad(part.tilted, ((0, 0), (0, most - part.tilted.shape[1]), (0, 0))) for part in parts]
+    oblique = [part.oblique_normals for part in parts]
+    most = max(each.shape[1] for each in oblique)
+    oblique = [np.pad(each, ((0, 0), (0, most - each.shape[1]), (0, 0))) for each in oblique]
     plain = all(part.length is None for part in parts)
     length = None if plain else np.concatenate([part.sizes for part in parts])
-    return type(parts[0])(**joined, tilted=np.concatenate(padded), length=length)
+    return type(parts[0])(**joined, oblique_normals=np.concatenate(oblique), length=length)
 
 
 def reference_axes(normals: np.ndarray) -> np.ndarray:
@@ -279,7 +279,7 @@ def with_symmetry(points: ContactPoints, marks: np.ndarray, planes: np.ndarray) 
     `marks`: which planes do, shape (n, n_planes); `planes`: their normals, the axes first.
     """
     dim = points.normal.shape[1]
-    return replace(points, symmetric=marks[:, :dim], tilted=marks[:, dim:, None] * planes[dim:])
+    return replace(points, symmetric=marks[:, :dim], oblique_normals=marks[:, dim:, None] * planes[dim:])
 
 
 def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
@@ -299,19 +299,19 @@ class FreeSpaces:
 
     Attributes:
         components: Those along the axes of the coordinates, shape (n_points, dim).
-        tilted: Points whose free directions are others, ascending, shape (k,).
+        oblique: Points whose free directions are others, ascending, shape (k,).
         projectors: The projections onto these, shape (k, dim, dim).
     """
 
     components: np.ndarray
-    tilted: np.ndarray
+    oblique: np.ndarray
     projectors: np.ndarray
 
     @classmethod
     def of(cls, points: ContactPoints, fixed: np.ndarray, axes: LocalAxes) -> FreeSpaces:
         """Return those of points; `fixed`: whether components are prescribed, along the axes of nodes."""
         dim, components = points.normal.shape[1], movable(points, fixed)
-        touched = points.tilted.any(axis=(1, 2)) | points.turned
+        touched = points.oblique_normals.any(axis=(1, 2)) | points.are_rotated
         if axes:
             turned = np.zeros(fixed.shape[0], dtype=bool)
             turned[axes.nodes] = True
@@ -330,7 +330,7 @@ class FreeSpaces:
         value, vector = np.linalg.eigh(square / every[:, None, None])
         held = np.einsum("nda,na,nea->nde", vector, value <= HELD**2, vector)
         across = np.eye(dim) * points.symmetric[at][:, :, None]
-        across = across + np.einsum("npd,npe->nde", points.tilted[at], points.tilted[at])
+        across = across + np.einsum("npd,npe->nde", points.oblique_normals[at], points.oblique_normals[at])
         value, vector = np.linalg.eigh(held + across)
         return cls(components, at, np.einsum("nda,na,nea->nde", vector, value <= HELD, vector))
 
@@ -338,9 +338,9 @@ class FreeSpaces:
         """Return the free parts of vectors at points, by default one at each, shape (n, dim)."""
         which = np.arange(len(self.components)) if which is None else which
         result = np.where(self.components[which], vectors, 0.0)
-        if len(self.tilted):
-            place = np.minimum(np.searchsorted(self.tilted, which), len(self.tilted) - 1)
-            mine = np.flatnonzero(self.tilted[place] == which)
+        if len(self.oblique):
+            place = np.minimum(np.searchsorted(self.oblique, which), len(self.oblique) - 1)
+            mine = np.flatnonzero(self.oblique[place] == which)
             result[mine] = np.einsum("nde,ne->nd", self.projectors[place[mine]], vectors[mine])
         return result
 
@@ -348,12 +348,12 @@ class FreeSpaces:
         """Return which points are held along one direction alone, (n,), and that direction, (n, dim)."""
         held = (~self.components).astype(float)
         single = held.sum(axis=1) == 1
-        if len(self.tilted):
+        if len(self.oblique):
             value, vector = np.linalg.eigh(self.projectors)
-            single[self.tilted] = np.round(value).sum(axis=1) == self.components.shape[1] - 1
+            single[self.oblique] = np.round(value).sum(axis=1) == self.components.shape[1] - 1
             along = vector[:, :, 0]
             largest = np.argmax(np.round(np.abs(along), 6), axis=1)[:, None]
-            held[self.tilted] = along * np.sign(np.take_along_axis(along, largest, axis=1))
+            held[self.oblique] = along * np.sign(np.take_along_axis(along, largest, axis=1))
         return single, held
 
 
@@ -574,16 +574,16 @@ def shared_once(points: ContactPoints, scene: Scene, advice: Notices, comm: MPI.
     advice.left_out(words, (scene.contacts, points, lost), (scene.contacts, points, kept), comm)
     if not len(lost):
         return points
-    area, taken = areas_taken(points, (kept, lost), scene)
-    taken = points.taken.maximum(taken)  # not their sum: entries are numbers of nodes
-    points = replace(points, area=points.area + area, taken=taken)
+    area, merged_nodes = merged_areas(points, (kept, lost), scene)
+    merged_nodes = points.merged_nodes.maximum(merged_nodes)  # not their sum: entries are numbers of nodes
+    points = replace(points, area=points.area + area, merged_nodes=merged_nodes)
     return points.part(np.setdiff1d(np.arange(points.count), lost))
 
 
-def areas_taken(
+def merged_areas(
     points: ContactPoints, couples: tuple[np.ndarray, np.ndarray], scene: Scene
 ) -> tuple[np.ndarray, sp.csr_matrix]:
-    """Return the areas that points take over from others, and whose they are, see `ContactPoints.taken`.
+    """Return the areas that points take over from others, and whose nodes' they are, by `merged_nodes`.
 
     `couples`: numbers of points and of those that they stand for, shape (n,) each.
     """

@@ -139,7 +139,7 @@ def find_tied_points(
         points = _faced(search, number, slave, master, np.ones(len(slave.nodes), dtype=bool))
         parts.append(_in_frames(points, search, tie))
     if scene.sectors:
-        parts = [points.as_turned() for points in parts]
+        parts = [points.as_rotated() for points in parts]
     return join_points(parts, scene.components, len(fixed))
 
 

@@ -53,7 +53,7 @@ def _tilt(surface: FacetedSurface) -> float:
     return float(np.linalg.norm(own - surface.averaged[surface.facets], axis=2).max())
 
 
-def check_held_alike(
+def check_supports_of_sides(
     ties: ContactPoints,
     scene: Scene,
     fixed: np.ndarray,
@@ -151,6 +151,6 @@ def without_repeated(
         largest = np.asarray(onto.argmax(axis=1)).ravel()
         count = len(scene.contacts)
         entries = points.slave[lost] + 1, (largest, points.pair[lost])
-        taken = points.taken.maximum(sp.csr_matrix(entries, shape=(points.count, count)))
-        points = replace(points, area=area, taken=taken)
+        merged_nodes = points.merged_nodes.maximum(sp.csr_matrix(entries, shape=(points.count, count)))
+        points = replace(points, area=area, merged_nodes=merged_nodes)
     return points.part(np.setdiff1d(np.arange(points.count), lost))

@@ -25,5 +25,5 @@ def with_turn(points: ContactPoints, scene: Scene) -> ContactPoints:
         tangents=np.concatenate([np.pad(points.tangents, ((0, 0), *across)), around], axis=1),
         axes=np.pad(points.axes, across),
         symmetric=np.column_stack([points.symmetric, on_axis]),
-        tilted=np.pad(points.tilted, ((0, 0), *across)),
+        oblique_normals=np.pad(points.oblique_normals, ((0, 0), *across)),
     )

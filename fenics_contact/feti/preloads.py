@@ -211,7 +211,7 @@ def _once_at_sections(
         return points
     dropped, left = np.concatenate(lost), np.concatenate(kept)
     entries = points.slave[dropped] + 1, (left, points.pair[dropped])
-    taken = points.taken.maximum(sp.csr_matrix(entries, shape=points.taken.shape))
+    merged_nodes = points.merged_nodes.maximum(sp.csr_matrix(entries, shape=points.merged_nodes.shape))
     area = points.area + np.bincount(left, points.area[dropped], points.count)
     rest = np.setdiff1d(np.arange(points.count), dropped)
-    return replace(points, area=area, taken=taken).part(rest)
+    return replace(points, area=area, merged_nodes=merged_nodes).part(rest)

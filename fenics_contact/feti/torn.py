@@ -57,10 +57,10 @@ def contact_and_tied_points(
         if len(scene.ties) > 1:
             ties = tied_once(ties, scene, fixed, axes)
         if scene.sectors:
-            from fenics_contact._pairing.sectors import check_held_alike, joined_around
+            from fenics_contact._pairing.sectors import check_supports_of_sides, joined_around
 
             with together(comm):
-                check_held_alike(ties, scene, fixed, axes)
+                check_supports_of_sides(ties, scene, fixed, axes)
             ties = joined_around(ties, ties, scene, areas=False)
             points = joined_around(points, ties, scene)
         if scene.contacts:

@@ -238,7 +238,7 @@ def test_points_inside_facets_have_the_planes_of_symmetry_of_their_places(turn: 
     which = [np.flatnonzero(points.slave == nodes[k(distance)])[0] for k in (np.argmin, np.argmax)]
     chosen = InFacets(np.array(which), np.full(2, facet), np.array([0.0 * end, end]), np.zeros(2))
     found = points_inside(of.scene, points, chosen, held, NO_AXES)
-    marks = [each.symmetric if turn == 0.0 else each.tilted for each in (points, found)]
+    marks = [each.symmetric if turn == 0.0 else each.oblique_normals for each in (points, found)]
     assert marks[0] is not None
     assert marks[1] is not None
     for mark, there in zip(marks, ([True, False], [False, True]), strict=True):

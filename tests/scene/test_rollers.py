@@ -47,7 +47,7 @@ IN_PLANE = PlaneStrain(1000.0, 0.3)
 def test_normals_lie_in_an_oblique_plane_however_the_face_falls_away_from_it() -> None:
     straight, oblique = (solved(stack(turn=turn, slope=0.1)) for turn in (False, True))
     points, normal = oblique.contact.points, oblique.contact.points.normal
-    on_plane = points.tilted.any(axis=(1, 2))
+    on_plane = points.oblique_normals.any(axis=(1, 2))
     assert np.count_nonzero(on_plane) == 5
     np.testing.assert_allclose(normal[on_plane] @ TURN[:, 1], 0.0, atol=1e-14)
     assert np.abs(normal[~on_plane] @ TURN[:, 1]).min() > 0.05

@@ -84,7 +84,7 @@ class Candidates:
             (n_candidates, n_slave).
         on_facet: The facet of the slave in which one lies, −1 at nodes, shape (n_candidates,).
         on_local: Local coordinates on it, shape (n_candidates, dim − 1).
-        taken: Whose areas they have, too, see `ContactPoints.taken`.
+        merged_nodes: Whose areas they have, too, see `ContactPoints.merged_nodes`.
     """
 
     number: int
@@ -97,7 +97,7 @@ class Candidates:
     own: sp.csr_matrix
     on_facet: np.ndarray
     on_local: np.ndarray
-    taken: sp.csr_matrix
+    merged_nodes: sp.csr_matrix
 
     @property
     def nodes(self) -> np.ndarray:
@@ -106,7 +106,7 @@ class Candidates:
 
     def part(self, chosen: np.ndarray) -> Self:
         """Return the pair with some of its candidates, by their positions; not of a body with itself."""
-        names = ("candidates", "offset", "given", "area", "own", "on_facet", "on_local", "taken")
+        names = ("candidates", "offset", "given", "area", "own", "on_facet", "on_local", "merged_nodes")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
     def normals(self, coordinates: np.ndarray) -> np.ndarray:
@@ -136,7 +136,8 @@ class Candidates:
         return ContactPoints.at_nodes(
             pair, self.nodes[chosen], weights, normal, gap, self.area[chosen], distance=distance,
             given=self.given[chosen], own=sp.csr_matrix(entries, shape=weights.shape),
-            slave_facet=self.on_facet[chosen], slave_local=self.on_local[chosen], taken=self.taken[chosen],
+            slave_facet=self.on_facet[chosen], slave_local=self.on_local[chosen],
+            merged_nodes=self.merged_nodes[chosen],
         )  # fmt: skip
 
     def joined_to(self, lost: np.ndarray, kept: np.ndarray) -> Self:
@@ -149,8 +150,10 @@ class Candidates:
         area = self.area.copy()
         np.add.at(area, place, self.area[there])
         entries = self.nodes[there] + 1, (place, np.full(len(place), self.number))
-        taken = self.taken.maximum(sp.csr_matrix(entries, shape=self.taken.shape))
-        return replace(self, area=area, taken=taken).part(np.setdiff1d(np.arange(len(area)), there))
+        merged_nodes = self.merged_nodes.maximum(sp.csr_matrix(entries, shape=self.merged_nodes.shape))
+        return replace(self, area=area, merged_nodes=merged_nodes).part(
+            np.setdiff1d(np.arange(len(area)), there)
+        )
 
 
 @dataclass(frozen=True)
@@ -237,13 +240,13 @@ def shared_once(meetings: tuple[SlidingPair, ...], scene: Scene) -> tuple[Slidin
     pairs, result = scene.contacts, list(meetings)
     for other, pair in enumerate(pairs):
         for one in range(other):
-            if _meet_alike(pairs[one], pair):
+            if _have_same_rows(pairs[one], pair):
                 beside = are_beside(scene, pairs[one], pair)
                 result[one], result[other] = _split(result[one], result[other], beside)
     return tuple(result)
 
 
-def _meet_alike(pair: ContactPair, other: ContactPair) -> bool:
+def _have_same_rows(pair: ContactPair, other: ContactPair) -> bool:
     """Return whether a node has the same counterpart and gap in both pairs."""
     one, two = pair.master, other.master
     same = one is two or (isinstance(one, (Surface, RigidPlane)) and one == two)
@@ -263,6 +266,6 @@ def _split(kept: SlidingPair, lost: SlidingPair, beside: bool) -> tuple[SlidingP
         area = kept.area.copy()
         area[here] += lost.area[there]
         entries = lost.nodes[there] + 1, (here, np.full(len(here), lost.number))
-        taken = kept.taken + sp.csr_matrix(entries, shape=kept.taken.shape)
-        kept = replace(kept, area=area, taken=taken.tocsr())
+        merged_nodes = kept.merged_nodes + sp.csr_matrix(entries, shape=kept.merged_nodes.shape)
+        kept = replace(kept, area=area, merged_nodes=merged_nodes.tocsr())
     return kept, lost.part(stays)

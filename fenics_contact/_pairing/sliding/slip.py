@@ -118,7 +118,7 @@ def slip_by_start(
     coordinates: np.ndarray,
     start: ContactPoints,
     differential: Differential,
-    alike: tuple[np.ndarray, np.ndarray],
+    common: tuple[np.ndarray, np.ndarray],
     turned: Mapping[int, np.ndarray],
 ) -> sp.csr_matrix:
     """Return the derivative of `SlidingPoints.slip` by the coordinates at its start.
@@ -137,7 +137,7 @@ def slip_by_start(
     local, slaves = point_motion(start, differential).local, start.own
     result = sp.csr_matrix((width * count, dim * nodes))
     for index, rotation in turned.items():
-        now, then = (each[points.pair[alike[0]] == index] for each in alike)
+        now, then = (each[points.pair[common[0]] == index] for each in common)
         rigid = bool(np.any(start.facet[then] < 0))
         for a in range(width):
             tangent = points.tangents[now, a]
@@ -158,7 +158,7 @@ def slip_by_start_of_means(
     coordinates: np.ndarray,
     start: tuple[ContactPoints, np.ndarray],
     means: MovingMeans,
-    alike: tuple[np.ndarray, np.ndarray],
+    common: tuple[np.ndarray, np.ndarray],
 ) -> sp.csr_matrix:
     """Return the same of a pair of mortar contact. Collective.
 
@@ -169,7 +169,7 @@ def slip_by_start_of_means(
     every, mine = start
     count, (width, dim) = points.count, points.tangents.shape[1:]
     now = np.full(every.count, -1)
-    now[alike[1]] = alike[0]
+    now[common[1]] = common[0]
     now, some = now[mine], every.part(mine)
     motion, met = means.motion(some, now >= 0), np.flatnonzero(now >= 0)
     result = sp.csr_matrix((width * count, dim * len(coordinates)))
