@@ -170,7 +170,7 @@ def tangent_step(
     face = classify(problem.layout, bound, at.multiplier, at.residual, ratio, problem.compliance)
     operator = CountedOperator(problem.operator)
     moving, fixed = growing_basis(problem.comm, face, problem.law.growth(at.multiplier), at.multiplier)
-    solved = _StiffFace.held(at, face, face.restriction if moving is None else moving, operator)
+    solved = _StiffFace.held(at, face, moving, operator)
     if solved is None:
         return None
     change, motions, stop = solved.solve(fixed, forcing, floor, max_products)

@@ -278,7 +278,12 @@ def solve_adjoint(
     operator = CountedOperator(problem.operator, lambda products, _: task.step(products))
     face_system = FaceSystems(problem, operator).build(face)
     transposed = CoupledSystem.build(
-        face_system, problem.coarse, linearised.moving, linearised.tested, damped=True
+        face_system,
+        problem.coarse,
+        linearised.moving,
+        linearised.tested,
+        curvature=face_system.face.curvature,
+        damped=True,
     )
     if transposed is None:
         raise NoAdjointError.of_loose_body()

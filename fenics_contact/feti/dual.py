@@ -25,7 +25,7 @@ from fenics_contact.feti.kernel_basis import TornModes, whole_motions
 from fenics_contact.feti.reduced_coarse import Elimination
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
-from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.coarse import NO_ELIMINATION, CoarseSpace
 from fenics_contact.qp.problem import DualProblem, Operator, Scaling, Unscaled
 
 
@@ -246,7 +246,7 @@ class DualSystem:
         self._Bt_interface = self._B_interface.T
         with timer.phase("coarse space"):
             self.kernel = self._kernel(comm)
-            eliminate = Elimination(torn.layout.equality) if self.whole_faces else None
+            eliminate = Elimination(torn.layout.equality) if self.whole_faces else NO_ELIMINATION
             columns, load = self._coarse_columns(), self._resultants(comm)
             coarse = self._without_unheld(CoarseSpace(comm, columns, load, eliminate=eliminate))
         with timer.phase("preconditioner"):

@@ -24,6 +24,34 @@ from fenics_contact.qp.reductions import Vector, global_sum
 RANK_TOLERANCE = 1e-12
 
 
+@dataclass(frozen=True, eq=False)
+class _Cholesky:
+    """The inverse of a regular matrix by its lower Cholesky factor."""
+
+    factor: Vector
+
+    @property
+    def flops(self) -> int:
+        return 2 * len(self.factor) ** 2
+
+    def solve(self, right_side: Vector) -> Vector:
+        return scipy.linalg.cho_solve((self.factor, True), right_side, check_finite=False)
+
+
+@dataclass(frozen=True, eq=False)
+class _Root:
+    """The generalised inverse R Rᵀ of a singular matrix."""
+
+    root: Vector
+
+    @property
+    def flops(self) -> int:
+        return 4 * self.root.size
+
+    def solve(self, right_side: Vector) -> Vector:
+        return self.root @ (self.root.T @ right_side)
+
+
 class GramInverse:
     """Generalised inverse of S = G G^T, which may be rank deficient.
 
@@ -40,37 +68,39 @@ class GramInverse:
         self._scale = 1.0 / np.sqrt(np.where(diagonal > floor, diagonal, 1.0))
         self.rank = len(matrix)
         self.null_space = np.zeros((len(matrix), 0))
-        self._cholesky = _trusted_cholesky(_scaled(matrix, self._scale))
-        if self._cholesky is None and len(matrix) > DENSE_LIMIT:
-            self._fill(_scaled(matrix, self._scale))
-        elif self._cholesky is None:
-            values, vectors = scipy.linalg.eigh(_scaled(matrix, self._scale))
-            keep = values > RANK_TOLERANCE * values.max(initial=0.0)
-            self.rank = int(keep.sum())
-            self.null_space = self._scale[:, None] * vectors[:, ~keep]
-            self._root = vectors[:, keep] / np.sqrt(values[keep])
+        self._inner = self._factored(matrix)
 
-    def _fill(self, scaled: Vector) -> None:
+    def _factored(self, matrix: Vector) -> _Cholesky | _Root:
+        cholesky = _trusted_cholesky(_scaled(matrix, self._scale))
+        if cholesky is not None:
+            return _Cholesky(cholesky)
+        if len(matrix) > DENSE_LIMIT:
+            return self._filled(_scaled(matrix, self._scale))
+        values, vectors = scipy.linalg.eigh(_scaled(matrix, self._scale))
+        keep = values > RANK_TOLERANCE * values.max(initial=0.0)
+        self.rank = int(keep.sum())
+        self.null_space = self._scale[:, None] * vectors[:, ~keep]
+        return _Root(vectors[:, keep] / np.sqrt(values[keep]))
+
+    def _filled(self, scaled: Vector) -> _Cholesky:
         """Factor a large singular matrix with its null vectors filled, S + Z Zᵀ, which is regular."""
         shifted = scipy.linalg.lu_factor(scaled + SHIFT * np.eye(len(scaled)))
         null = _null_vectors(len(scaled), lambda columns: np.asarray(scipy.linalg.lu_solve(shifted, columns)))
-        self._cholesky = np.linalg.cholesky(scaled + null @ null.T)
         self.rank -= null.shape[1]
         self.null_space = self._scale[:, None] * null
+        return _Cholesky(np.linalg.cholesky(scaled + null @ null.T))
 
     @property
     def flops(self) -> int:
         """Floating point operations of one solution on this rank."""
-        return 2 * len(self._scale) ** 2 if self._cholesky is not None else 4 * self._root.size
+        return self._inner.flops
 
     def solve(self, right_side: Vector) -> Vector:
         """Apply the generalised inverse to an array of shape (m,) or (m, k)."""
         if right_side.size == 0:
             return np.zeros_like(right_side)
         scale = self._scale if right_side.ndim == 1 else self._scale[:, None]
-        if self._cholesky is None:
-            return scale * (self._root @ (self._root.T @ (scale * right_side)))
-        return scale * scipy.linalg.cho_solve((self._cholesky, True), scale * right_side, check_finite=False)
+        return scale * self._inner.solve(scale * right_side)
 
 
 def _scaled(matrix: Vector, scale: Vector) -> Vector:
@@ -178,6 +208,18 @@ class Composed:
         return sp.csr_matrix(left @ right[:, first:])
 
 
+class NoElimination:
+    """Coarse matrices of faces stay as large as they are."""
+
+    equality: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+
+    def __call__(self, comm: MPI.Comm, columns: sp.csr_matrix) -> None:
+        """Return none."""
+
+
+NO_ELIMINATION = NoElimination()
+
+
 class CoarseSpace:
     """Equilibrium of all rigid motions, G lambda = e, with P = I - G^T (G G^T)^-1 G.
 
@@ -195,7 +237,7 @@ class CoarseSpace:
         e: Vector,
         *,
         gram: Gram | Callable[[], CoarseInverse] | None = None,
-        eliminate: Elimination | None = None,
+        eliminate: Elimination = NO_ELIMINATION,
     ) -> None:
         """Store this rank's columns.
 
@@ -216,7 +258,7 @@ class CoarseSpace:
         """Generalised inverse of G G^T, factored on first access. Collective then."""
         if callable(self._gram):
             return self._gram()
-        if self._gram is None and self.eliminate is not None and self.faces is not None:
+        if self._gram is None and self.faces is not None:
             contact = np.setdiff1d(np.arange(self.matrix.shape[1]), self.eliminate.equality)
             return self.faces.inverse(self.matrix[:, contact])
         gram = gram_matrix(self.comm, self.matrix) if self._gram is None else self._gram
@@ -226,7 +268,7 @@ class CoarseSpace:
     @property
     def faces(self) -> FaceGrams | None:
         """Reduced matrices of faces, None where these are not worth it. Collective on first use."""
-        if self.eliminate is None or self.m <= DENSE_LIMIT:
+        if self.m <= DENSE_LIMIT:
             return None
         if not self._reduced:
             self._reduced.append(self.eliminate(self.comm, self.matrix))
@@ -314,14 +356,14 @@ class CoarseSpace:
         face has all equality rows and begins with them, Z = [I_E, Z_C].
         """
         columns, load = self.columns(Z, whole=whole), self.load if load is None else load
-        if not isinstance(columns, Composed) or self.eliminate is None or (faces := self.faces) is None:
+        if not isinstance(columns, Composed) or (faces := self.faces) is None:
             return CoarseSpace(self.comm, columns, load, gram=gram)
         contact = columns.from_column(len(self.eliminate.equality))
         return CoarseSpace(self.comm, columns, load, gram=lambda: faces.inverse(contact))
 
     def columns(self, Z: sp.spmatrix | sp.sparray, *, whole: bool = False) -> sp.csr_matrix | Composed:
         """Return G Z of a face, as a matrix where it is not reduced; see `restricted`. Collective."""
-        if not whole or self.eliminate is None or self.faces is None:
+        if not whole or self.faces is None:
             return sp.csr_matrix(self.matrix @ Z)
         return Composed((self.matrix, sp.csr_matrix(Z)))
 

@@ -223,14 +223,14 @@ class CoupledSystem:
         tested: sp.csr_matrix,
         moving: sp.csr_matrix,
         *,
-        curvature: Vector | None = None,
+        curvature: Vector,
         damped: bool = False,
         whole: bool = True,
         least_damping: float = 1e-4,
     ) -> CoupledSystem | None:
         """Join both bases; None where the face does not hold every body. Collective.
 
-        `tested`: W; `moving`: Z; `curvature`: κ, by default that of the face; `whole`: whether both begin
+        `tested`: W; `moving`: Z; `curvature`: κ; `whole`: whether both begin
         with all equality rows, see `CoarseSpace.restricted`; `least_damping`: lower bound on D, so that
         motions that only offsets resist stay distinct from unresisted ones.
         """
@@ -241,12 +241,11 @@ class CoupledSystem:
         oblique = ObliqueProjector.build(columns, own, faces, shared)
         if oblique is None:
             return None
-        kappa = system.face.curvature if curvature is None else curvature
         if not damped:
-            return cls(system, tested, moving, kappa, oblique, oblique)
+            return cls(system, tested, moving, curvature, oblique, oblique)
         damping = np.maximum(system.face.damping, least_damping)
         spared = coarse.restricted(sp.csr_matrix(moving @ sp.diags(damping)), whole=whole)
-        return cls(system, tested, moving, kappa, oblique, DampedEquilibrium(damping, spared))
+        return cls(system, tested, moving, curvature, oblique, DampedEquilibrium(damping, spared))
 
     def transposed(self, coarse: CoarseSpace) -> CoupledSystem | None:
         """Return the system with its bases swapped; None where that does not hold every body. Collective."""
@@ -299,13 +298,13 @@ class CoupledFace:
 
 def growing_basis(
     comm: MPI.Comm, face: Face, growth: Vector, multiplier: Vector
-) -> tuple[sp.csr_matrix | None, Vector]:
-    """Return Z of a face with growing friction, None without, and the part of λ that is fixed. Collective.
+) -> tuple[sp.csr_matrix, Vector]:
+    """Return Z of a face, with growing friction if any, and the part of λ that is fixed. Collective.
 
     Friction grows by dΨ/dλ_N, owned by disc, from the multiplier at which the face was determined.
     """
     if global_max(comm, float(np.any(growth[face.slip] > 0.0))) == 0.0:
-        return None, face.fixed
+        return face.restriction, face.fixed
     coupling = face.growth(growth)
     fixed = face.fixed - coupling @ np.maximum(face.restrict(multiplier), 0.0)
     return (face.restriction + coupling).tocsr(), fixed
@@ -317,7 +316,8 @@ def couple(system: FaceSystem, coarse: CoarseSpace, growth: Vector, multiplier: 
     Returns the coupled face; None where no disc grows, or where the face does not hold every body.
     """
     moving, fixed = growing_basis(system.comm, system.face, growth, multiplier)
-    if moving is None:
+    face = system.face
+    if moving is face.restriction:
         return None
-    coupled = CoupledSystem.build(system, coarse, system.face.restriction, moving)
+    coupled = CoupledSystem.build(system, coarse, face.restriction, moving, curvature=face.curvature)
     return None if coupled is None else CoupledFace(coupled, coarse, fixed)
