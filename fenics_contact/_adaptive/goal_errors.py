@@ -54,8 +54,6 @@ from fenics_contact.design.objective import (
 from fenics_contact.design.objectives import (
     LargestPressure,
     PressureNorm,
-    StrainEnergy,
-    TotalPotential,
     points_of,
 )
 from fenics_contact.design.sensitivity import adjoint_of
@@ -196,14 +194,16 @@ def goal_error(
             _require_reached(state, objective, (value,), partials, 0.01 * tolerance)
             return _without_adjoint(linear, value, str(error))
         products = error_products(state.torn, linear.conforming_displacement, adjoint.displacement)
-        weight = energy_weight(smooth)
+        # J'' is that multiple of a; zero where it is not known.
+        energies = getattr(smooth, "energies", (0.0, 0.0))
+        weight = energies[0]
         inside, shares = _in_cells(state, products, weight)
         # Adjoint forces of energies are multiples of the pressure, which vanishes at the rim of a contact.
         between = between_nodes(linear, adjoint.multiplier, 0.0 if weight else 0.5)
         others = between, of_pressures(linear, partials)
         bound = _sum(comm, shares) + float(np.abs(others).sum())
         _require_reached(state, objective, (value, bound), partials, 0.01 * tolerance)
-        boundary, curved = between_facets(linear, adjoint.displacement, energy_shares(smooth))
+        boundary, curved = between_facets(linear, adjoint.displacement, EnergyShares(*energies))
         shares = _joined(shares, curved)
         bound += _sum(comm, curved)
         geometry = _by_geometry(linear, adjoint) + boundary
@@ -237,26 +237,6 @@ def smoothed(objective: Objective, state: State, forms: ShapeForms, spots: int =
         p = max(2.0, 0.9 * p)
     norm = PressureNorm(objective.pair, p=p)
     return (highest / norm.value(state, forms)) * norm
-
-
-def energy_weight(objective: Objective) -> float:
-    """Return k of J'' = k a, the second derivative of an objective; zero where it is not known."""
-    if isinstance(objective, StrainEnergy | TotalPotential):
-        return 1.0
-    if isinstance(objective, WeightedSum):
-        return float(sum(weight * energy_weight(each) for weight, each in objective.terms))
-    return 0.0
-
-
-def energy_shares(objective: Objective) -> EnergyShares:
-    """Return how an objective depends on the shape at a given state, as far as that is known."""
-    if isinstance(objective, StrainEnergy | TotalPotential):
-        return EnergyShares(1.0, float(isinstance(objective, TotalPotential)))
-    if isinstance(objective, WeightedSum):
-        known = [(weight, energy_shares(each)) for weight, each in objective.terms]
-        sums = (sum(w * getattr(each, name) for w, each in known) for name in ("strain", "load"))
-        return EnergyShares(*sums)
-    return EnergyShares()
 
 
 def _joined(shares: OfCells, others: OfCells) -> OfCells:

@@ -11,8 +11,7 @@ from fenics_contact._adaptive.refined_scene import SceneRefinement, refined_agai
 from fenics_contact._adaptive.underresolved_contact import cells_at
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.scene import Scene
-from fenics_contact.design.objective import Objective, WeightedSum
-from fenics_contact.design.objectives import FrictionWork
+from fenics_contact.design.objective import Objective
 from fenics_contact.mesh.refinement import halves_together
 from fenics_contact.results.contact import Status
 from fenics_contact.results.state import State
@@ -20,9 +19,7 @@ from fenics_contact.results.state import State
 
 def depends_on_slip(objective: Objective) -> bool:
     """Return whether a quantity is made of slip, so that a spot of it that no mesh shows is missing in it."""
-    if isinstance(objective, WeightedSum):
-        return any(depends_on_slip(each) for _, each in objective.terms)
-    return isinstance(objective, FrictionWork)
+    return bool(getattr(objective, "is_of_slip", False))
 
 
 def refined_at_sticking_ends(

@@ -118,7 +118,7 @@ class Configuration:
         """Return the configuration with its forces on the rows of other contact points. Collective."""
         diagonal = self.diagonal
         if diagonal is not None:
-            diagonal = contact.carried(diagonal, self.contact, spread=True)
+            diagonal = contact.spread(diagonal, self.contact)
         forces = contact.carried(self.multiplier, self.contact)
         return replace(self, multiplier=forces, diagonal=diagonal, contact=contact)
 

@@ -338,20 +338,22 @@ class Progress:
         """Return it with the effort of a trial."""
         return replace(self, effort=self.effort.followed_by(effort, len(self.fractions)))
 
-    def reaching(
-        self, fraction: float, found: NonlinearEquilibrium, since: float, *, anew: bool, ends: bool
-    ) -> Progress:
-        """Return it with another equilibrium; histories begin anew there, or it ends a step. Collective."""
+    def reaching(self, fraction: float, found: NonlinearEquilibrium, since: float) -> Progress:
+        """Return it with another equilibrium within a step of histories. Collective."""
         earlier_friction_work = self.earlier_friction_work
-        if self.end is not None and (self.ended or anew):
+        if self.end is not None and self.ended:
             earlier_friction_work += self.end.evaluation.friction_work
-        at = found.configuration if ends else found.continued(self.origin[0])
-        torn, start = found.evaluation.torn, self.start.extended(found.evaluation.contact.slip_start)
+        start = self.start.extended(found.evaluation.contact.slip_start)
         return replace(
-            self, at=at, torn=torn, known=found.linearisation, origin=(at, torn) if ends else self.origin,
+            self, at=found.continued(self.origin[0]), torn=found.evaluation.torn, known=found.linearisation,
             start=start, end=found, reached=fraction, fractions=(*self.fractions, fraction), since=since,
-            earlier_friction_work=earlier_friction_work, ended=ends,
+            earlier_friction_work=earlier_friction_work, ended=False,
         )  # fmt: skip
+
+    def ending(self, fraction: float, found: NonlinearEquilibrium, since: float) -> Progress:
+        """Return it with another equilibrium, which ends a step of histories. Collective."""
+        now = self.reaching(fraction, found, since)
+        return replace(now, at=found.configuration, origin=(found.configuration, now.torn), ended=True)
 
 
 class _Parts:
@@ -405,9 +407,9 @@ class _LoadStepFollower:
             found = self.steps.newton.solve(self.equations, load, now.at, self.timer, now.known, moved)
         except ConvergenceError as failure:
             return now.costing(Effort.until(failure)), failure
-        finer = self.steps.finer_history
-        since = now.reached if finer else now.since
-        return now.costing(found.effort).reaching(fraction, found, since, anew=False, ends=finer), None
+        if self.steps.finer_history:
+            return now.costing(found.effort).ending(fraction, found, now.reached), None
+        return now.costing(found.effort).reaching(fraction, found, now.since), None
 
     def from_near(self, now: Progress, near: Near) -> Progress:
         """Return the progress at the whole load from near its end; none where that fails. Collective."""
@@ -417,7 +419,7 @@ class _LoadStepFollower:
         except ConvergenceError as failure:
             safe_log(_LOG.info, "the start from coarser meshes led nowhere: %s", failure)
             return now.costing(Effort.until(failure))
-        return now.costing(found.effort).reaching(1.0, found, now.since, anew=False, ends=False)
+        return now.costing(found.effort).reaching(1.0, found, now.since)
 
     def snapped(self, now: Progress, fraction: float, part: float, failure: ConvergenceError) -> Progress:
         """Return the progress after bodies have snapped where a part of the load fails. Collective."""
@@ -439,8 +441,8 @@ class _LoadStepFollower:
         far = global_max(now.torn.numbering.comm, np.linalg.norm(way, axis=1).max(initial=0.0))
         snap = Snap(fraction, float(far), motion.dissipated, motion.stages)
         safe_log(_LOG.info, "%s", snap)
-        now = replace(now, snaps=(*now.snaps, snap))
-        return now.reaching(fraction, found, fraction, anew=True, ends=True)
+        now = replace(now, snaps=(*now.snaps, snap), ended=True)  # histories begin anew
+        return now.ending(fraction, found, fraction)
 
     def _load(self, fraction: float, at: Configuration, before: TornSystem) -> Loading:
         """Return the load at a part of the way, with slip that begins at a configuration. Collective."""

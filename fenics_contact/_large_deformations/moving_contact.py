@@ -324,11 +324,12 @@ class ContactConfiguration:
         """
         return FollowerStiffness.of_loads(self.prescribed.size, further)
 
-    def carried(self, values: Vector, other: ContactConfiguration, spread: bool = False) -> Vector:
-        """Return a vector on the rows of other points on the rows of these. Collective.
+    def carried(self, values: Vector, other: ContactConfiguration) -> Vector:
+        """Return a vector on the rows of other points on the rows of these, zero at new ones. Collective."""
+        return values
 
-        Points that are new get zero, with ``spread`` the mean of the others.
-        """
+    def spread(self, values: Vector, other: ContactConfiguration) -> Vector:
+        """Return the same, but with the mean of others at points that are new. Collective."""
         return values
 
     def of_step(self, friction: np.ndarray, start: MaterialPoints, before: EarlierSlip) -> dict[str, Any]:
@@ -450,16 +451,22 @@ class MovedContact(ContactConfiguration):
         pressed = SymmetricLowRank(stiffness.columns, stiffness.values, slave[stiffness.point])
         return FollowerStiffness.of(pressed.joined(springs), blocks, further, corrections)
 
-    def carried(self, values: Vector, other: ContactConfiguration, spread: bool = False) -> Vector:
-        moved = cast(MovedContact, other)
-        torn, before = self.torn, other.torn
+    def carried(self, values: Vector, other: ContactConfiguration) -> Vector:
+        before = cast(MovedContact, other).points
         normal, friction = other.at_points(values)
-        if spread:
-            normal, friction = (self._filled(x, moved.points) for x in (normal, friction))
-        else:
-            normal = self.points.carry(normal, moved.points)
-            friction = self.points.carry_tangential(friction, moved.points)
-            friction[self._across] = 0.0
+        friction = self.points.carry_tangential(friction, before)
+        friction[self._across] = 0.0
+        return self._on_rows(values, other.torn, self.points.carry(normal, before), friction)
+
+    def spread(self, values: Vector, other: ContactConfiguration) -> Vector:
+        before = cast(MovedContact, other).points
+        return self._on_rows(values, other.torn, *(self._filled(x, before) for x in other.at_points(values)))
+
+    def _on_rows(
+        self, values: Vector, before: TornSystem, normal: np.ndarray, friction: np.ndarray
+    ) -> Vector:
+        """Return a vector with values at points, and those of other rows of a vector of a system before."""
+        torn = self.torn
         result = np.empty(len(torn.numbering.owned))
         equality = torn.numbering.owned < torn.n_equality
         result[equality] = values[before.numbering.owned < before.n_equality]

@@ -123,6 +123,11 @@ class Weighable:
     #: NumPy's numbers leave products to this class.
     __array_ufunc__ = None
 
+    #: Shares s and l of ½ a(u, u) and of the work −L(u) in it, beside which it depends on the state alone.
+    energies = (0.0, 0.0)
+    #: Whether it is made of slip.
+    is_of_slip = False
+
     @property
     def can_be_infinite(self) -> bool:
         """Whether it may grow without limit as cells get smaller, as stresses at sharp corners do.
@@ -188,6 +193,18 @@ class WeightedSum(Weighable):
                     f"an objective can be added to another one, got {type(objective).__name__}: add an "
                     "object with value and partials, such as TotalPotential()"
                 )
+
+    @property
+    def energies(self) -> tuple[float, float]:  # type: ignore[override]
+        """The sums of those of the terms."""
+        known = [(weight, getattr(each, "energies", (0.0, 0.0))) for weight, each in self.terms]
+        strain, load = (float(sum(weight * each[k] for weight, each in known)) for k in (0, 1))
+        return strain, load
+
+    @property
+    def is_of_slip(self) -> bool:  # type: ignore[override]
+        """Whether one of the terms is."""
+        return any(getattr(each, "is_of_slip", False) for _, each in self.terms)
 
     @property
     def can_be_infinite(self) -> bool:

@@ -116,6 +116,8 @@ class TotalPotential(Weighable):
     Not with fluid in contacts.
     """
 
+    energies = (1.0, 1.0)
+
     can_be_infinite = False
 
     def value(self, state: State, forms: ShapeForms) -> float:
@@ -158,6 +160,8 @@ class StrainEnergy(Weighable):
         InvalidInputError: If the scene has a `ThermalStrain`: a part of the strain is then without stress,
             and ½ uᵀK u is no stored energy.
     """
+
+    energies = (1.0, 0.0)
 
     can_be_infinite = False
 
@@ -388,6 +392,8 @@ class FrictionWork(Weighable):
     Attributes:
         pair: Number of the contact pair in the scene; None for all.
     """
+
+    is_of_slip = True
 
     can_be_infinite = False
 
