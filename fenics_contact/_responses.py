@@ -80,10 +80,7 @@ class Response(ABC):
         if failures not in ("raise", "nan"):
             raise InvalidInputError(f"failures must be 'raise' or 'nan', got {failures!r}")
         if not nominal:
-            raise InvalidInputError(
-                "a response needs at least one parameter, got none: name them with their usual values, "
-                "{'load': 80e3}"
-            )
+            raise InvalidInputError("a response needs at least one parameter, got none: name them in nominal")
         self.nominal = {name: float(value) for name, value in nominal.items()}
         self.comm, self._failures = comm, failures
         self.evaluations, self.products = 0, 0
@@ -155,16 +152,13 @@ class Response(ABC):
             if array.shape != (len(self.nominal),):
                 raise InvalidInputError(
                     f"parameters must have shape ({len(self.nominal)},), one number for each of "
-                    f"{list(self.parameters)}, got {array.shape}: give them all in this order, or some by "
-                    "name"
+                    f"{list(self.parameters)}, got {array.shape}: give all, or some by name"
                 )
             given = {name: float(value) for name, value in zip(self.parameters, array, strict=True)}
         chosen = {**(given or {}), **named}
         unknown = [name for name in chosen if name not in self.nominal]
         if unknown:
-            raise InvalidInputError(
-                f"parameters must be some of {list(self.parameters)}, got {unknown}: name them as in nominal"
-            )
+            raise InvalidInputError(f"parameters must be some of {list(self.parameters)}, got {unknown}")
         values = {**self.nominal, **{name: float(value) for name, value in chosen.items()}}
         bad = [name for name, value in values.items() if not np.isfinite(value)]
         if bad:
@@ -221,10 +215,7 @@ class SceneResponse(Response):
         """
         super().__init__(nominal, comm, failures)
         if not quantities:
-            raise InvalidInputError(
-                "a response needs at least one quantity of interest, got none: give {'name': function of "
-                "the state}"
-            )
+            raise InvalidInputError("a response needs at least one quantity of interest, got none: name one")
         self._build, self._of_state, self._warm = build, dict(quantities), warm
         self._partitions = partitions
         self._problem_of = partial(
@@ -311,8 +302,7 @@ def _number(name: str, value: Any) -> float:
     array = np.asarray(value)
     if array.size != 1:
         raise InvalidInputError(
-            f"a quantity must be one number, {name!r} has shape {array.shape}: take its largest entry or a "
-            "norm, or make a quantity of each entry"
+            f"a quantity must be one number, {name!r} has shape {array.shape}: take its largest entry or norm"
         )
     try:
         return float(array.item())

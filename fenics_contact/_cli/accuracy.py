@@ -85,10 +85,7 @@ def accuracy(
     """Measure what accuracy costs in time."""
     console = console_of(context)
     if console.comm.size > 1:
-        raise InvalidInputError(
-            f"a study starts its own ranks, got mpirun with {console.comm.size}: run it without mpirun and "
-            f"give --ranks {console.comm.size}"
-        )
+        raise InvalidInputError(f"a study starts its own ranks: give --ranks {console.comm.size}, not mpirun")
     logging.getLogger("fenics_contact").setLevel(logging.INFO)
     study = find_study(scene)
     given = {
@@ -115,8 +112,7 @@ def _report(plan: StudyPlan, folder: Path, *, figures: bool) -> str:
     if not results.good:
         reasons = "".join(f"\n  {run.failed}" for run in results.runs[:3])
         raise InvalidInputError(
-            f"a report needs runs that have an answer, {folder} has none of this code and these options: "
-            f"run the study without --report, or repair what failed{reasons}"
+            f"a report needs runs that have an answer, {folder} has none: run without --report{reasons}"
         )
     return write_report(folder, results, figures=figures)
 

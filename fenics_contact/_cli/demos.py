@@ -43,8 +43,7 @@ def demo(
         return
     if name not in there:
         raise InvalidInputError(
-            f"a demo is one of {list(there)}, got {name!r}: {suggestion(name, there)}`fenics-contact demo` "
-            "lists them"
+            f"a demo is one of {list(there)}, got {name!r}: {suggestion(name, there)}choose one"
         )
     chosen = there[name]
     if copy:
@@ -66,9 +65,7 @@ def folder_of_demos() -> Path:
     for folder in (package.parent / "demos", package / "demos"):
         if any(folder.glob("demo_*.py")):
             return folder
-    raise InvalidInputError(
-        f"demos must lie in 'demos' in or beside {package}, there are none: install the package again"
-    )
+    raise InvalidInputError(f"demos must lie in 'demos' in or beside {package}: install the package again")
 
 
 def shipped() -> dict[str, Path]:

@@ -142,9 +142,7 @@ def _to_accuracy(console: Console, file: SceneFile, task: ShapeTask, resume: boo
     asked = file.document.accuracy
     assert asked is not None
     if resume:
-        raise InvalidInputError(
-            "--resume needs a checkpoint, and an optimisation to an accuracy keeps none: leave it out"
-        )
+        raise InvalidInputError("--resume needs a checkpoint, and an optimisation to an accuracy keeps none")
     found = task.minimize_to(asked.relative_error, asked.made(), table_of_levels(console))
     console.write(f"{found.reason}\n")
     last, result = found.problems[-1], found.optimisations[-1]

@@ -152,8 +152,7 @@ def _asked(accuracy: str | None, of: str | None) -> list[str]:
             error = float("nan")
         if not 0.0 < error < 1.0:
             raise InvalidInputError(
-                f"--accuracy must lie between 0 and 1, or 0% and 100%, got {accuracy!r}: 1% or 0.01 asks for "
-                "one percent"
+                f"--accuracy must lie between 0 and 1, or 0% and 100%, got {accuracy!r}: 1% or 0.01 are usual"
             )
         asked.append(f"accuracy.relative_error={error!r}")
     if of is not None:
@@ -182,9 +181,7 @@ def _read(
 
         return read_deck_file(scene, console.comm, overrides, statics_only)
     if statics_only:
-        raise InvalidInputError(
-            f"--statics-only is of decks, got the scene file {str(scene)!r}: leave the option out"
-        )
+        raise InvalidInputError(f"--statics-only is of decks, got the scene file {str(scene)!r}")
     return read_scene_file(scene, console.comm, overrides=overrides, python=python)
 
 

@@ -34,9 +34,8 @@ class Gallery:
         """Refuse to end well without a requested picture, once everything else is written."""
         if self.missing:
             raise InvalidInputError(
-                f"the pictures that a scene file requests must be possible, {', '.join(self.missing)} could "
-                "not be drawn, everything else is written: take it out of [output] pictures, or run with "
-                "--no-pictures"
+                f"pictures that a scene file requests must be possible, {', '.join(self.missing)} could not "
+                "be drawn, all else is written: take it out of [output] pictures, or run with --no-pictures"
             )
 
 
@@ -203,9 +202,7 @@ def _view(console: Console, result: Path, save: Path | None, field: str, options
     except OSError as error:
         there, reason = False, error.strerror or str(error)
     if not there:
-        raise InvalidInputError(
-            f"a result needs a folder or file that exists, got '{result}' ({reason}): correct the path"
-        )
+        raise InvalidInputError(f"a result needs a folder or file that exists, got '{result}' ({reason})")
     if result.suffix in FIELD_FILES:
         fields: Path | None = result
     else:
@@ -229,7 +226,7 @@ def _view(console: Console, result: Path, save: Path | None, field: str, options
     if field not in ranges:
         raise InvalidInputError(
             f"--field must be one of {list(ranges)}, got {field!r}: {suggestion(field, list(ranges))}choose "
-            "one of them"
+            "one"
         )
     from fenics_contact.pictures.states import plot_field
 

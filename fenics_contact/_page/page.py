@@ -415,8 +415,7 @@ def source_of_states(states: Mapping[str, State]) -> Source:
     strange = [type(state).__name__ for state in states.values() if not isinstance(state, State)]
     if strange or not states:
         raise InvalidInputError(
-            f"a page needs a state, states by name, or a file, got {', '.join(strange) or 'none'}: give what "
-            "solve_scene returned, or the folder that write_result wrote to"
+            f"a page needs a state, states by name, or a file, got {', '.join(strange) or 'none'}"
         )
     steps: list[tuple[str, Mapping[str, pyvista.UnstructuredGrid]]] = []
     for name, state in states.items():
@@ -466,10 +465,7 @@ class Page:
     def __fspath__(self) -> str:
         """Return the path of the file."""
         if self.path is None:
-            raise InvalidInputError(
-                "this needs the file of a page, but the page was not written: give result_page a path, such "
-                "as 'page.html'"
-            )
+            raise InvalidInputError("the page was not written: give result_page a path")
         return str(self.path)
 
     def __str__(self) -> str:
@@ -609,9 +605,7 @@ def _first(fields: list[dict[str, Any]], name: str) -> int:
     """Return the number of the field that is shown first."""
     names = [entry["source"] for entry in fields]
     if name and name not in names:
-        raise InvalidInputError(
-            f"field must be one of {', '.join(dict.fromkeys(names))}, got {name!r}: choose one of them"
-        )
+        raise InvalidInputError(f"field must be one of {', '.join(dict.fromkeys(names))}, got {name!r}")
     return names.index(name) if name else 0
 
 

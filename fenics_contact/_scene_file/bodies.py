@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from fenics_contact._base.checks import STEEPEST
 from fenics_contact._scene_file.part import Part, keys_of, table_of
+from fenics_contact._scene_file.source import branches
 from fenics_contact._scene_file.values import (
     NumberOrPairs,
     Numbers,
@@ -91,9 +92,7 @@ def made_choice(given: Any) -> Any:
 
 def by_place(given: Any) -> bool:
     """Return whether any face is chosen by where it lies."""
-    if isinstance(given, Mapping):
-        return any(map(by_place, given.values()))
-    return any(map(by_place, given)) if isinstance(given, list) else isinstance(given, Part)
+    return any(isinstance(part, Part) for _, part in branches(given))
 
 
 ISOTROPIC: dict[str, Callable[..., Material]] = {
@@ -121,10 +120,7 @@ class IsotropicMaterial(_Material):
         """Return the material."""
         given = {name: getattr(self, name) for name in self.given}
         if self.model == "isotropic" and given.pop("thickness", None) is not None:
-            raise InvalidInputError(
-                "a thickness is that of plane bodies, of the models plane_stress and plane_strain, this one "
-                "is in space: leave it out"
-            )
+            raise InvalidInputError("a thickness is that of plane bodies, this one is in space: leave it out")
         return ISOTROPIC[self.model](**given)
 
     @classmethod
@@ -289,9 +285,7 @@ class Placed(Part):
         dim = shape.mesh.dim
         move = np.zeros(dim) if self.translate is None else np.array(self.translate)
         if len(move) != dim:
-            raise InvalidInputError(
-                f"translate must have {dim} entries like the mesh, got {list(move)}: give {dim} numbers"
-            )
+            raise InvalidInputError(f"translate must have {dim} entries like the mesh, got {list(move)}")
         if self.degrees == 0.0 and self.scale == 1.0 and not move.any():
             return shape
         return shape.placed(_rotation(self.axis, self.degrees)[:dim, :dim], move, self.scale)
@@ -341,8 +335,8 @@ class MeshFile(Placed):
     size: PositiveFloat | None = Field(
         None, description="largest edge of a cell, for CAD files, which gmsh meshes, [length]"
     )
-    sizes: dict[str, PositiveFloat] | None = Field(
-        None, description="body or surface of a CAD file -> size of the cells there, [length]"
+    sizes: dict[str, PositiveFloat] = Field(
+        {}, description="body or surface of a CAD file -> size of the cells there, [length]"
     )
     order: Literal[1, 2] = Field(1, description="order of the cells that CAD files are meshed with")
     labels: str | None = Field(
@@ -364,32 +358,32 @@ class MeshFile(Placed):
         """Read the file on rank 0. Collective."""
         return {name: Shaped(mesh) for name, mesh in self._read(folder / self.file, comm).items()}
 
+    def _gives(self, *keys: str) -> bool:
+        """Return whether any of the keys differs from its default."""
+        return any(getattr(self, key) != type(self).model_fields[key].default for key in keys)
+
     def _read(self, path: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:
         kind, groups = path.suffix.lower(), (self.bodies, made_choice(self.surfaces))
         if self.deck:
-            others = (*groups, self.labels, self.size, self.sizes)
-            if any(each is not None for each in others) or self.order > 1 or self.corners_only:
+            if self._gives("bodies", "surfaces", "labels", "size", "sizes", "order", "corners_only"):
                 raise InvalidInputError(
-                    f"a mesh with deck = true has the bodies and surfaces that {self.file!r} names: leave "
-                    "all other keys of the mesh out, or deck"
+                    f"a mesh with deck = true has the bodies and surfaces that {self.file!r} names: omit "
+                    "other keys"
                 )
             return read_deck_mesh(path, comm)
-        if kind in (*CAD, ".msh", ".xdmf") and (self.labels is not None or self.corners_only):
+        if kind in (*CAD, ".msh", ".xdmf") and self._gives("labels", "corners_only"):
             raise InvalidInputError(
-                f"labels and corners_only are for other formats than CAD, .msh and .xdmf, got {self.file!r}: "
-                "choose groups with bodies and surfaces"
+                f"labels and corners_only are for other formats than CAD, .msh and .xdmf, got {self.file!r}"
             )
         if kind in CAD:
             return cad.read_cad(path, self.size, *groups, sizes=self.sizes, order=self.order, comm=comm)
         if by_place(self.surfaces):
             raise InvalidInputError(
-                f"faces are chosen by where they lie in CAD files ({', '.join(CAD)}), got {self.file!r}: "
-                "choose groups by their names or numbers"
+                f"faces are chosen by place in CAD files ({', '.join(CAD)}), got {self.file!r}: choose groups"
             )
-        if self.size is not None or self.sizes is not None or self.order > 1:
+        if self._gives("size", "sizes", "order"):
             raise InvalidInputError(
-                f"size, sizes and order are for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it "
-                "away, or mesh the body anew"
+                f"size, sizes and order are for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it out"
             )
         if kind == ".msh":
             return gmsh_module.read_msh(path, *groups, comm=comm)

@@ -30,8 +30,8 @@ from fenics_contact._scene_file.model import (
     PreloadPart,
     SpringPart,
 )
-from fenics_contact._scene_file.part import Part
-from fenics_contact._scene_file.source import Mistake, Source, as_toml, branches, written
+from fenics_contact._scene_file.part import Part, values_of
+from fenics_contact._scene_file.source import Mistake, Source, as_toml, written
 from fenics_contact._scene_file.source import Path as Keys
 from fenics_contact._scene_file.values import (
     Line,
@@ -63,22 +63,22 @@ if TYPE_CHECKING:
 class NewtonPart(Part):
     """How the load of a load step is followed in parts, which are halved where Newton's method fails."""
 
-    first: float | None = Field(
-        default=None, gt=0, le=1, description="first part of a load step that is tried, the whole by default"
+    first: float = Field(
+        default=1.0, gt=0, le=1, description="first part of a load step that is tried, the whole by default"
     )
-    smallest: float | None = Field(
-        default=None,
+    smallest: float = Field(
+        default=1.0 / 256,
         gt=0,
         le=1,
         description="smallest part; one that fails ends the run with what is reached",
     )
-    snaps: bool | None = Field(
-        default=None,
+    snaps: bool = Field(
+        default=False,
         description="whether bodies without an equilibrium near move on through a viscous medium to the next "
         "one, false by default",
     )
-    finer_history: bool | None = Field(
-        default=None,
+    finer_history: bool = Field(
+        default=False,
         description="whether each part is a step of its own for slip and histories of materials, false by "
         "default: a load step is one step of them, however it is followed",
     )
@@ -96,7 +96,7 @@ class NewtonPart(Part):
 
         given = self.model_dump(exclude_none=True)
         of_parts = ("first", "smallest", "snaps", "finer_history")
-        parts = {name: given.pop(name) for name in of_parts if name in given}
+        parts = {name: given.pop(name) for name in of_parts}
         return AutomaticSteps(TangentNewton(**given), **parts)
 
 
@@ -155,9 +155,9 @@ class SolverPart(Part):
         """Return the dual solver given by the keys, None for the default one."""
         if scene.is_nonlinear and (self.method != "auto" or self.max_products is not None):
             raise InvalidInputError(
-                "method and max_products are for linear materials, this scene has others, which Newton's "
-                f"method solves, got method {self.method!r} and max_products {self.max_products}: leave them "
-                "out, or set 'newton'"
+                "method and max_products are for linear materials, Newton's method solves this scene, got "
+                f"method {self.method!r} and max_products {self.max_products}: leave them out, or set "
+                "'newton'"
             )
         kinds: dict[str, DualSolver] = {
             "face_newton": FaceNewton(),
@@ -365,8 +365,7 @@ def _require_few(steps: Sequence[StepPart]) -> None:
     count = sum(step.count for step in steps)
     if count > MOST:
         raise InvalidInputError(
-            f"a file may have at most {MOST} load steps in all, got {count}: take larger steps, or drive a "
-            "longer history from Python with LoadSequence"
+            f"a file may have at most {MOST} load steps, got {count}: take larger steps, or use LoadSequence"
         )
 
 
@@ -477,10 +476,9 @@ def references(document: Document) -> Iterator[tuple[Keys, str]]:
             yield ("materials", name, "model"), material.model
     if document.accuracy is not None and is_reference(document.accuracy.quantity):
         yield ("accuracy", "quantity"), document.accuracy.quantity
-    for path, part in branches(document.design, ("design",)):
-        objective = getattr(part, "objective", None) if isinstance(part, Part) else None
-        if isinstance(objective, str) and is_reference(objective):
-            yield (*path, "objective"), objective
+    for path, objective in values_of(document.design, "objective", ("design",)):
+        if is_reference(objective):
+            yield path, objective
 
 
 def refused_python(source: Source, document: Document) -> list[Mistake]:

@@ -23,7 +23,7 @@ from fenics_contact._scene.preloads import Preload, Section
 from fenics_contact._scene.sectors import CyclicSymmetry
 from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import RigidSurface, Roller, Support, ToolMotion
-from fenics_contact._scene_file.part import Part, keys_of, table_of
+from fenics_contact._scene_file.part import Part, keys_of, not_in_files, table_of
 from fenics_contact._scene_file.values import (
     FREE,
     Components,
@@ -96,9 +96,8 @@ class ObstaclePart(Part):
         if self.tool is not None:
             if self.motion is not None or self.about is None:
                 raise InvalidInputError(
-                    f"the tool {self.tool!r} must have the point 'about' which it turns and no motion, which "
-                    f"supports of the kind 'tool' give it, got {self.about!r} and {self.motion!r}: give the "
-                    "point, and the motion there"
+                    f"the tool {self.tool!r} needs the point 'about' which it turns and no motion, which "
+                    f"supports of kind 'tool' give it, got {self.about!r} and {self.motion!r}"
                 )
             return RigidTool(self.tool, still, tuple(self.about))
         if self.motion is None:
@@ -305,7 +304,7 @@ class _Named(Part):
     """A part that load steps change."""
 
     changed: ClassVar[str] = "value"
-    name: str | None = Field(None, description="how load steps call it")
+    name: str = Field("", description="how load steps call it")
 
     @property
     def size(self) -> Any:
@@ -329,9 +328,8 @@ class _Named(Part):
 
 
 class _Load(_Named):
-    def build(self, dim: int, value: Any = None) -> Load:
-        """Return the load, with the value of a load step if given."""
-        value = self.size if value is None else value
+    def build(self, dim: int, value: Any) -> Load:
+        """Return the load with a value, its own or that of a load step."""
         if isinstance(value, tuple) and any(map(callable, value)):
             value = VectorExpression(value)
         return self.made(**{self.changed: value})
@@ -352,10 +350,9 @@ class TotalMomentLoad(_Load):
         """Return no: a total force has these keys, too."""
         return False
 
-    def build(self, dim: int, value: Any = None) -> Load:
+    def build(self, dim: int, value: Any) -> Load:
         """Return the load, without a force."""
-        moment = self.moment if value is None else value
-        return self.made(value=(0.0,) * dim, moment=moment)
+        return self.made(value=(0.0,) * dim, moment=value)
 
 
 @keys_of(loads.gravity)
@@ -390,10 +387,9 @@ class CentrifugalLoad(_Load):
         spin = made.value
         return cls.keys({**vars(spin), "body": made.body, "region": made.region})
 
-    def build(self, dim: int, value: Any = None) -> Load:
-        """Return the load, at the speed of a load step if given."""
-        speed = self.speed if value is None else value
-        return self.made(speed=float(speed(np.zeros((1, dim)))[0]) if callable(speed) else speed)
+    def build(self, dim: int, value: Any) -> Load:
+        """Return the load at a speed."""
+        return self.made(speed=float(value(np.zeros((1, dim)))[0]) if callable(value) else value)
 
 
 @keys_of(loads.point_mass)
@@ -432,9 +428,9 @@ class SupportPart(_Named):
         "a formula in x, y, z in quotes, or a field from a file; zero in all directions by default",
     )
 
-    def build(self, dim: int, value: tuple[Any, ...] | None = None) -> Support:
-        """Return the support."""
-        return self.made(value=value or self.value or (0.0, 0.0, 0.0))
+    def build(self, dim: int, value: tuple[Any, ...] | None) -> Support:
+        """Return the support with a value, its own or that of a load step."""
+        return self.made(value=value or (0.0, 0.0, 0.0))
 
 
 @keys_of(RigidSurface, without=("displacement", "rotation"))
@@ -460,9 +456,9 @@ class RigidPart(_Named):
         """Return the motion."""
         return made.motion
 
-    def build(self, dim: int, value: tuple[Any, ...] | None = None) -> RigidSurface:
-        """Return the rigid surface, with the motion of a load step if given."""
-        motion = tuple(map(self._number, value or self.size))
+    def build(self, dim: int, value: tuple[Any, ...]) -> RigidSurface:
+        """Return the rigid surface with a motion, its own or that of a load step."""
+        motion = tuple(map(self._number, value))
         turned = motion[dim:]
         return self.made(
             displacement=motion[:dim], rotation=turned[0] if dim == 2 and len(turned) == 1 else turned
@@ -495,15 +491,12 @@ class RollerPart(_Named):
     def written(cls, made: Any) -> dict[str, Any]:
         """Return the table of the roller, whose directions must be the same at all nodes."""
         if callable(made.direction):
-            raise InvalidInputError(
-                f"a scene file has no directions that differ from node to node, as {made.in_words} has: run "
-                "the deck, or read it in Python"
-            )
+            raise not_in_files(f"no directions that differ from node to node, as {made.in_words} has")
         return super().written(made)
 
-    def build(self, dim: int, value: Any = None) -> Roller:
-        """Return the roller, with the displacement of a load step if given."""
-        return self.made(displacement=self.displacement if value is None else value)
+    def build(self, dim: int, value: Any) -> Roller:
+        """Return the roller with a displacement, its own or that of a load step."""
+        return self.made(displacement=value)
 
 
 @keys_of(ElasticFoundation)
@@ -525,17 +518,16 @@ class SpringPart(Part):
     stiffness: either(list, Vector, PositiveFloat) = Field(  # type: ignore[valid-type]
         description="[force / length]: a number along the line between the ends, or one for each axis"
     )
-    name: str | None = Field(None, description="how results call it, both ends by default")
+    name: str = Field("", description="how results call it, both ends by default")
 
     def made(self, **other: Any) -> Spring:
         """Build the spring, with the second end that its keys give."""
         if (self.second is None) == (self.point is None):
             raise InvalidInputError(
-                f"a spring needs a second surface or a fixed point, got second={self.second!r} and "
-                f"point={self.point!r}: give one of them"
+                f"a spring needs a second surface or a fixed point, got {self.second!r} and {self.point!r}"
             )
         second: Any = self.point if self.second is None else self.second.made()
-        return super().made(second=second, name=self.name or "")
+        return super().made(second=second, name=self.name)
 
 
 @keys_of(ConstraintTerm)
@@ -564,11 +556,11 @@ class ConstraintPart(Part):
     value: either(list, list[float], float) = Field(  # type: ignore[valid-type]
         0.0, description="what the sum is, or that of each equation, [length]"
     )
-    name: str | None = Field(None, description="how load steps and results call it, the terms by default")
+    name: str = Field("", description="how load steps and results call it, the terms by default")
 
     def made(self, **other: Any) -> LinearConstraint:
         """Build the constraint."""
-        return super().made(terms=[term.made() for term in self.terms], name=self.name or "")
+        return super().made(terms=[term.made() for term in self.terms], name=self.name)
 
     @classmethod
     def written(cls, made: Any) -> dict[str, Any]:
@@ -581,7 +573,7 @@ class ConstraintPart(Part):
 class PreloadPart(Part):
     """A bolt drawn together at a section of its body; without force and shortening held at its length."""
 
-    name: str | None = Field(None, description="how load steps and results call it, the body by default")
+    name: str = Field("", description="how load steps and results call it, the body by default")
     point: Vector | None = Field(None, description="a point of the plane of the section, [length]")
     normal: Vector | None = Field(None, description="normal of the plane, the axis of the bolt")
     regions: Annotated[Names | None, Field(min_length=2, max_length=2)] = Field(
@@ -601,7 +593,7 @@ class PreloadPart(Part):
         section: Any = self.regions
         if plane:
             section = Section(self.point or (), self.normal or (), self.region, self.radius)
-        return super().made(section=section, name=self.name or "")
+        return super().made(section=section, name=self.name)
 
     @classmethod
     def written(cls, made: Any) -> dict[str, Any]:
@@ -642,11 +634,11 @@ class ToolPart(_Named):
         loads = (*(force or (0.0,) * dim), *turned)
         return (*(self.value or (None,) * count), *map(float, loads))
 
-    def build(self, dim: int, value: tuple[Any, ...] | None = None) -> ToolMotion:
-        """Return the motion of the tool, with motion, force and moment of a load step if given."""
-        row, count = value or self.size, 3 * dim - 3
+    def build(self, dim: int, value: tuple[Any, ...]) -> ToolMotion:
+        """Return the motion of the tool with motion, force and moment, its own or those of a load step."""
+        count = 3 * dim - 3
         numbers = [
-            float(each(np.zeros((1, dim)))[0]) if isinstance(each, Expression) else each for each in row
+            float(each(np.zeros((1, dim)))[0]) if isinstance(each, Expression) else each for each in value
         ]
         motion, load = tuple(numbers[:count]), tuple(numbers[count:])
         turned, moment = motion[dim:], load[dim:]

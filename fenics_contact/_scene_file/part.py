@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, create_model, model_validator
@@ -12,6 +12,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
 from fenics_contact._base.checks import MOST, GivenVector, meaning
 from fenics_contact._scene.fields import ScalarValue, VectorValue
+from fenics_contact._scene_file.source import Path, branches
 from fenics_contact._scene_file.values import (
     CountPair,
     CountTriple,
@@ -26,6 +27,7 @@ from fenics_contact._scene_file.values import (
     Vector,
     VectorOrFormulas,
 )
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.temperature_dependent import ByTemperature
 
 _FORMULAS = "; numbers, formulas in x, y, z in quotes, or fields from files"
@@ -187,3 +189,15 @@ def _field(
     kind = Annotated[(own.annotation, *own.metadata)] if own.metadata else own.annotation
     default = default if own.is_required() else own.default
     return kind, Field(default, description=own.description or words, alias=own.alias)
+
+
+def not_in_files(what: str) -> InvalidInputError:
+    """Return an error about what cannot be written, which says what scene files have instead."""
+    return InvalidInputError(f"a scene file has {what}: run the deck, or read it in Python")
+
+
+def values_of(data: Any, key: str, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    """Yield what tables give under a key, with paths."""
+    for place, part in branches(data, path):
+        if isinstance(part, Part) and getattr(part, key, None) is not None:
+            yield (*place, key), getattr(part, key)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -161,8 +161,7 @@ class Builder:
         with self._at("automatic_contact"):
             if built["contacts"]:
                 raise InvalidInputError(
-                    f"a scene has [automatic_contact] or [[contacts]], got both, {len(built['contacts'])} of "
-                    "the latter: leave one of them out"
+                    "a scene has [automatic_contact] or [[contacts]], got both: leave one of them out"
                 )
             scene = Scene(bodies, **{**built, "contacts": document.automatic_contact.made()})
         self._check()
@@ -172,7 +171,7 @@ class Builder:
         """Return a part, as it is before the first load step if there are any."""
         if not hasattr(part, "build"):
             return part.made()
-        return part.build(dim, at_time(part.size, 0.0) if self._document.steps else None)
+        return part.build(dim, at_time(part.size, 0.0) if self._document.steps else part.size)
 
     def _check_surfaces(self, bodies: Mapping[str, Body]) -> None:
         for path, part in surface_parts(self._document):
@@ -222,23 +221,40 @@ def _key(part: FieldFile) -> tuple[Any, ...]:
     return part.file, tuple(part.field) if isinstance(part.field, list) else part.field
 
 
+@singledispatch
 def _replaced(value: Any, read: Mapping[tuple[Any, ...], Any]) -> Any:
     """Return a copy of a part of a document with what was read from files."""
-    if isinstance(value, FieldFile):
-        return read[_key(value)]
-    if isinstance(value, TriangulationPart):
-        return value.of_shape(read[value.key])
-    if isinstance(value, BaseModel):
-        own = {name: (part, _replaced(part, read)) for name, part in value}
-        changed = {name: new for name, (old, new) in own.items() if new is not old}
-        return value.model_copy(update=changed) if changed else value
-    if isinstance(value, list | tuple):
-        parts = [_replaced(part, read) for part in value]
-        same = all(new is old for new, old in zip(parts, value, strict=True))
-        return value if same else type(value)(parts)
-    if isinstance(value, Mapping):
-        return {name: _replaced(part, read) for name, part in value.items()}
     return value
+
+
+@_replaced.register(FieldFile)
+def _(value: FieldFile, read: Mapping[tuple[Any, ...], Any]) -> Any:
+    return read[_key(value)]
+
+
+@_replaced.register(TriangulationPart)
+def _(value: TriangulationPart, read: Mapping[tuple[Any, ...], Any]) -> Any:
+    return value.of_shape(read[value.key])
+
+
+@_replaced.register(BaseModel)
+def _(value: BaseModel, read: Mapping[tuple[Any, ...], Any]) -> Any:
+    own = {name: (part, _replaced(part, read)) for name, part in value}
+    changed = {name: new for name, (old, new) in own.items() if new is not old}
+    return value.model_copy(update=changed) if changed else value
+
+
+@_replaced.register(list)
+@_replaced.register(tuple)
+def _(value: list | tuple, read: Mapping[tuple[Any, ...], Any]) -> Any:
+    parts = [_replaced(part, read) for part in value]
+    same = all(new is old for new, old in zip(parts, value, strict=True))
+    return value if same else type(value)(parts)
+
+
+@_replaced.register(Mapping)
+def _(value: Mapping, read: Mapping[tuple[Any, ...], Any]) -> Any:
+    return {name: _replaced(part, read) for name, part in value.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,10 +350,7 @@ def _over_steps(
     """Return the problem whose objective is added over load steps, if there are any. Collective."""
     if not steps:
         if design.over_steps is not None or any(getattr(part, "step", None) for part in design.constraints):
-            raise InvalidInputError(
-                "over_steps and step are names of load steps, but the file has none: give [[steps]], or "
-                "leave them out"
-            )
+            raise InvalidInputError("over_steps and step name load steps, the file has none: give [[steps]]")
         return problem
     if design.over_steps is None:
         return LoadPath(problem, steps)
@@ -352,8 +365,7 @@ def _objective(name: Any, source: Source) -> Objective:
         missing = [part for part in ("value", "partials") if not hasattr(given, part)]
     if missing or isinstance(given, type):
         raise InvalidInputError(
-            f"objective {name!r} must be an object with value and partials, got {given!r}: see "
-            "fenics_contact.design.Objective, and give an instance, not a class"
+            f"objective {name!r} must be an object with value and partials, got {given!r}: give an instance"
         )
     objective: Objective = given
     return objective
@@ -402,8 +414,7 @@ def _limits(part: VolumeConstraint | ObjectiveConstraint, unit: float = 1.0) -> 
 def _fitting(name: str, values: tuple[float, ...], size: int) -> np.ndarray:
     if len(values) != size:
         raise InvalidInputError(
-            f"{name} must have {size} entries, one for each design variable, got {len(values)}: the nets of "
-            "design.surfaces have so many control points"
+            f"{name} must have {size} entries, one per design variable, got {len(values)}"
         )
     return np.array(values)
 
@@ -637,8 +648,7 @@ def _source(scene: str | Path | Mapping[str, Any], comm: MPI.Comm) -> Source:
         return Source("the scene", Path(), scene)
     if not isinstance(scene, str | Path):
         raise InvalidInputError(
-            f"a scene must be the path of a TOML file or a dictionary, got {type(scene).__name__}: give one "
-            "of them"
+            f"a scene must be the path of a TOML file or a dictionary, got {type(scene).__name__}"
         )
     path = Path(scene)
     return parse(on_root_then_bcast(comm, lambda: _text_of(path)), path.name, path.parent)
@@ -654,14 +664,13 @@ def _text_of(path: Path) -> str:
         ) from error
     if content is None:
         raise InvalidInputError(
-            f"the scene file '{path}' must have at most {LARGEST // 10**6} MB, it has more: put meshes into "
-            "files of their own"
+            f"the scene file '{path}' must have at most {LARGEST // 10**6} MB: put meshes into their own "
+            "files"
         )
     try:
         return content.decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InvalidInputError(
-            f"the scene file '{path}' must be readable UTF-8 text, line {line} is not ({error.reason}): let "
-            "the editor save it as UTF-8"
+            f"the scene file '{path}' must be UTF-8, line {line} is not ({error.reason}): save it as UTF-8"
         ) from error

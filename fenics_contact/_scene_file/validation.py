@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from fenics_contact._base.progress import is_visible
 from fenics_contact._scene_file.document import Document
-from fenics_contact._scene_file.part import Part
+from fenics_contact._scene_file.part import Part, values_of
 from fenics_contact._scene_file.source import (
     Mistake,
     Path,
@@ -93,10 +93,8 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
             yield ("bodies", name, "material", region), made_of[region], "a material"
         if isinstance(made_of, str):
             yield ("bodies", name, "material"), made_of, "a material"
-    for path, part in branches(document):
-        named = getattr(part, "body", None) if isinstance(part, Part) else None
-        if named is not None:
-            yield (*path, "body"), named, "a body"
+    for path, body in values_of(document, "body"):
+        yield path, body, "a body"
     cuts = document.solver.subdomains
     for name in cuts if isinstance(cuts, Mapping) else ():
         yield ("solver", "subdomains", name), name, "a body"
@@ -105,8 +103,8 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
             "supports": step.supports, "loads": step.loads, "preloads": step.preloads or (),
             "fluids": step.fluids, "constraints": step.constraints,
         }  # fmt: skip
-        for key, named in changed.items():
-            for name in named:
+        for key, its in changed.items():
+            for name in its:
                 yield ("steps", number, key, name), name, f"the name of a {key[:-1]}"
 
 
@@ -122,14 +120,11 @@ def _wrong_pairs(source: Source, document: Document) -> Iterator[Mistake]:
     count = len(document.contacts)
     if document.automatic_contact is not None:
         return  # they are not known yet
-    for path, part in branches(document):
-        pair = getattr(part, "pair", None) if isinstance(part, Part) else None
-        if pair is not None and pair >= count:
+    for path, pair in values_of(document, "pair"):
+        if pair >= count:
             known = f"0 to {count - 1}" if count else "but it has none"
-            words = (
-                f"{written((*path, 'pair'))} must be the number of a contact of the file, {known}, got {pair}"
-            )
-            yield source.mistake((*path, "pair"), words)
+            words = f"{written(path)} must be the number of a contact of the file, {known}, got {pair}"
+            yield source.mistake(path, words)
 
 
 def _twice(source: Source, document: Document) -> Iterator[Mistake]:
@@ -140,7 +135,7 @@ def _twice(source: Source, document: Document) -> Iterator[Mistake]:
                 path: Path = (key, number, "name")
                 words = f"{written(path)} must be a name of its own, got {as_toml(part.name)} twice"
                 yield source.mistake(path, words)
-            seen |= {part.name} - {None}
+            seen |= {part.name} - {""}
 
 
 def _unlike(source: Source, document: Document) -> Iterator[Mistake]:

@@ -102,8 +102,7 @@ class Expression:
     def _tree(self) -> ast.expr:
         if len(self.text) > LONGEST:
             raise InvalidInputError(
-                f"a formula must have at most {LONGEST} characters, got {len(self.text)}: "
-                "write a Python function and a scene in Python for it"
+                f"a formula must have at most {LONGEST} characters, got {len(self.text)}: write it in Python"
             )
         try:
             with warnings.catch_warnings():
@@ -113,8 +112,7 @@ class Expression:
                 return ast.parse(self.text.strip(), mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             raise InvalidInputError(
-                "a formula must be arithmetic such as '0.1 * x**2', got "
-                f"{shortened(self.text)!r}: write {ALLOWED}"
+                f"a formula must be like '0.1 * x**2', got {shortened(self.text)!r}: write {ALLOWED}"
             ) from error
 
     @property
@@ -157,8 +155,7 @@ class Expression:
             place = ", ".join(f"{x:.6g}" for x in points[infinite[0]])
             raise InvalidInputError(
                 f"the formula {shortened(self.text)!r} must have a finite value at every node, got "
-                f"{result[infinite[0]]} at ({place}): choose another one there with where(condition, a, b), "
-                "each of whose values may be infinite where the other is taken"
+                f"{result[infinite[0]]} at ({place}): choose another one there with where(condition, a, b)"
             )
         return result
 
@@ -230,8 +227,7 @@ def _check(node: ast.expr, text: str, depth: int) -> None:
             if depth > DEEPEST:
                 part = f"more than {DEEPEST} nested operations"
             raise InvalidInputError(
-                f"a formula may hold {ALLOWED}, got {shortened(part)!r} in {shortened(text)!r}: leave it "
-                "out, or give the value by a scene in Python"
+                f"a formula may hold {ALLOWED}, got {shortened(part)!r} in {shortened(text)!r}: leave it out"
             )
         left = operation.left if isinstance(operation, ast.BinOp) else None
         for child in ast.iter_child_nodes(operation):

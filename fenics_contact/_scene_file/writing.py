@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import singledispatch
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -11,9 +13,8 @@ from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene_file import model
 from fenics_contact._scene_file.bodies import MATERIALS
 from fenics_contact._scene_file.document import BodyPart, Document
-from fenics_contact._scene_file.part import Part
+from fenics_contact._scene_file.part import Part, not_in_files
 from fenics_contact._scene_file.values import FREE
-from fenics_contact.errors import InvalidInputError
 
 #: Tables of objects; of two that describe one the last is the more special.
 TABLES: tuple[type[Part], ...] = (
@@ -29,28 +30,33 @@ def table_for(made: object) -> type[Part]:
     """Return the table that builds an object, or raise `InvalidInputError` if scene files have none."""
     found = [table for table in TABLES if table.describes(made)]
     if not found:
-        raise InvalidInputError(
-            f"a scene file has no table for {type(made).__name__}: run the deck, or read it in Python"
-        )
+        raise not_in_files(f"no table for {type(made).__name__}")
     return found[-1]
 
 
+@singledispatch
 def as_toml_value(value: Any, name: str, write: WriteField) -> Any:
     """Return a value as it is written, objects as their tables; `name`: for fields within it."""
-    if value is None:
-        return FREE
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, NodeValues):
-        return write(value, name)
-    if isinstance(value, Mapping):
-        return {key: as_toml_value(each, name, write) for key, each in value.items()}
-    if isinstance(value, tuple | list):
-        names = [f"{name} {axis}" for axis in "xyz"] if len(value) <= 3 else [name] * len(value)
-        return [as_toml_value(each, own, write) for each, own in zip(value, names, strict=False)]
-    if isinstance(value, str | bool | int | float):
-        return value
     return as_table(value, name, write)
+
+
+@as_toml_value.register(tuple)
+@as_toml_value.register(list)
+def _(value: tuple | list, name: str, write: WriteField) -> list[Any]:
+    names = [f"{name} {axis}" for axis in "xyz"] if len(value) <= 3 else [name] * len(value)
+    return [as_toml_value(each, own, write) for each, own in zip(value, names, strict=False)]
+
+
+@as_toml_value.register(Mapping)
+def _(value: Mapping, name: str, write: WriteField) -> dict[str, Any]:
+    return {key: as_toml_value(each, name, write) for key, each in value.items()}
+
+
+as_toml_value.register(NoneType, lambda value, name, write: FREE)
+as_toml_value.register(np.ndarray, lambda value, name, write: value.tolist())
+as_toml_value.register(NodeValues, lambda value, name, write: write(value, name))
+for _kind in (str, int, float):
+    as_toml_value.register(_kind, lambda value, name, write: value)
 
 
 def as_table(made: object, name: str, write: WriteField) -> dict[str, Any]:

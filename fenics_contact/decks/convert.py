@@ -16,6 +16,7 @@ from fenics_contact._scene.scene import LoadStep
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact._scene_file.document import Document, StepPart
 from fenics_contact._scene_file.model import PreloadAim
+from fenics_contact._scene_file.part import not_in_files
 from fenics_contact._scene_file.values import FREE
 from fenics_contact._scene_file.writing import as_table, as_toml_value, body_table, lists_of, table_for
 from fenics_contact.decks.deck import Deck
@@ -116,19 +117,13 @@ class _Writer:
         held, tables, begin = list[Any](), [], 0.0
         for number, step in enumerate(steps):
             if step.contacts is not None:
-                raise InvalidInputError(
-                    f"a scene file has the same contact pairs in all steps, {step.name} changes them: run "
-                    "the deck, or read it in Python"
-                )
+                raise not_in_files(f"the same contact pairs in all steps, {step.name} changes them")
             values = dict(self._load(each, number, names, loads) for each in step.loads or ())  # type: ignore[union-attr]
             supports = [self._held(each, k, number) for k, each in enumerate(step.supports or ())]  # type: ignore[arg-type]
             how = [_holds(table) for table in supports]
             held = held or how
             if how != held:
-                raise InvalidInputError(
-                    f"a scene file has the same components held in all steps, {step.name} holds others than "
-                    "the first: run the deck, or read it in Python"
-                )
+                raise not_in_files(f"the same components held in all steps, {step.name} changes them")
             end = float(number + 1) if step.time is None else step.time
             aims = {each.label: PreloadAim.keys(vars(each)) for each in step.preloads or ()}
             tables.append(StepPart.keys({
@@ -156,9 +151,8 @@ class _Writer:
         value, zero = table[key], _nothing(table[key])
         table[key] = zero
         if loads.setdefault(name, (table, zero)) != (table, zero):
-            raise InvalidInputError(
-                f"a scene file changes the value of a load from step to step alone, {name} of body "
-                f"{load.body!r} changes more: run the deck, or read it in Python"
+            raise not_in_files(
+                f"loads that change by their values alone, not so {name} of body {load.body!r}"
             )
         return name, value
 
@@ -166,10 +160,7 @@ class _Writer:
         """Return the table of a support in a step."""
         table = self._table(support, f"support {number} step {step}")
         if table.keys() & {"force", "moment"}:
-            raise InvalidInputError(
-                f"a scene file has one force on a rigid surface for all steps, {support.in_words} changes "
-                "it: run the deck, or read it in Python"
-            )
+            raise not_in_files(f"one force on a rigid surface for all steps, {support.in_words} changes it")
         return table
 
 

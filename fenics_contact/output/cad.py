@@ -38,6 +38,10 @@ class CadError(InvalidDesignError):
     """A design has no surface, or no body, that a CAD file can hold; the message has the reason."""
 
 
+def _without_solid(found: str) -> CadError:
+    return CadError(f"{found}: write the surfaces alone with solid=False")
+
+
 @dataclass(frozen=True, eq=False)
 class SplineFit:
     """A B-spline of degree five with the same clamped knots along all parameters, from 0 to 1.
@@ -74,7 +78,7 @@ def fitted(surface: MovedSurface, tolerance: float, most: int = 129) -> SplineFi
             raise CadError(
                 f"the B-spline of the surface on {surface.design.body!r} must be within {allowed:.3g} of it, "
                 f"{count} points along each parameter leave {deviation:.3g}: the surface has kinks; give a "
-                "larger tolerance or a smoother reference"
+                "larger tolerance"
             )
         count = 2 * count - 1
 
@@ -119,8 +123,8 @@ def _require_unfolded(surface: MovedSurface, after: np.ndarray) -> None:
         at = _places(count, axes)[np.argmax(turned)]
         where = ", ".join(f"{name} = {place:.3g}" for name, place in zip("st", at, strict=False))
         raise CadError(
-            f"the surface that a design moves on {surface.design.body!r} must not fold over itself, it does "
-            f"at {where}: bound the movement by less than the radius of curvature"
+            f"the surface designed on {surface.design.body!r} folds over itself at {where}: bound its "
+            "movement"
         )
 
 
@@ -189,10 +193,7 @@ def flat_sides(
         return [FlatSide(loops, max(bends, default=0.0))]
     sides = np.unique(labels[labels >= len(surfaces)])
     if len(sides) > most:
-        raise CadError(
-            "a body in a CAD file needs few flat sides besides its designed surfaces, its mesh has "
-            f"{len(sides)}: write the surfaces alone with solid=False"
-        )
+        raise _without_solid(f"a body in a CAD file needs few flat sides, its mesh has {len(sides)}")
     found = []
     for side in sides:
         mine = labels == side
@@ -269,10 +270,7 @@ def _edge(nodes: np.ndarray, label: int, surfaces: Sequence[DesignSurface]) -> E
         for turned in (False, True):
             if np.array_equal(line[::-1] if turned else line, nodes):
                 return Edge(nodes, label, side, turned)
-    raise CadError(
-        "each side of a designed surface must be one edge of a flat side of a body in a CAD file, one is "
-        "not: write the surfaces alone with solid=False"
-    )
+    raise _without_solid("each side of a designed surface must be one edge of a flat side, one is not")
 
 
 def _lines(surface: DesignSurface) -> tuple[np.ndarray, ...]:
@@ -321,9 +319,8 @@ def _put(fit: SplineFit, planes: Mapping[int, Plane], tolerance: float) -> Splin
     allowed = tolerance * float(np.ptp(fit.points.reshape(-1, 3), axis=0).max())
     if off > allowed:
         raise CadError(
-            f"the rim of a designed surface must stay within {allowed:.3g} of the flat side at it, it "
-            f"leaves it by {off:.3g}: hold it there, as with optimize.fixed_rim, or write the surfaces alone "
-            "with solid=False"
+            f"the rim of a designed surface must stay within {allowed:.3g} of the flat side at it, it leaves "
+            f"it by {off:.3g}: hold it by optimize.fixed_rim, or write the surfaces alone with solid=False"
         )
     return replace(fit, points=points, deviation=fit.deviation + off)
 
@@ -400,8 +397,7 @@ def write_step(
     with together(problem.comm):
         if target.suffix.lower() not in (".step", ".stp") or not 0.0 < scale < np.inf:
             raise InvalidInputError(
-                f"write_step needs a file .step or .stp and a scale above zero, got {target.name!r} and "
-                f"{scale}: give millimetres in the scene's unit of length"
+                f"write_step needs a file .step or .stp and a scale above zero, got {target.name!r}, {scale}"
             )
     name, mesh = moved_body(problem, alpha, body)
     surfaces = [one for one in moved_surfaces(problem, alpha) if one.design.body == name]
@@ -436,10 +432,8 @@ def _reasons() -> Iterator[None]:
     except CadError:
         raise
     except Exception as reason:  # gmsh raises no other class
-        raise CadError(
-            f"OpenCASCADE must be able to build the sides of a body, it reported: {reason}: write the "
-            "surfaces alone with solid=False"
-        ) from reason
+        words = f"OpenCASCADE must be able to build the sides of a body, it reported: {reason}"
+        raise _without_solid(words) from reason
 
 
 class _Drawing:
@@ -468,9 +462,8 @@ class _Drawing:
         edges = self._gmsh.model.getBoundary(self._gmsh.model.getBoundary([body]), combined=True)
         if edges:
             raise CadError(
-                f"the sides of a body in a CAD file must enclose it, {len(sides)} flat ones and "
-                f"{len(self._fits)} designed surfaces leave {len(edges)} open edges: write the surfaces "
-                "alone with solid=False"
+                f"the sides of a body must enclose it, {len(sides)} flat ones and {len(self._fits)} designed "
+                f"surfaces leave {len(edges)} open edges: write the surfaces alone with solid=False"
             )
         self._keep([body])
         return float(abs(self._occ.getMass(*body)) / self._scale ** body[0])

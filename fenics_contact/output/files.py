@@ -184,9 +184,7 @@ def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
     if isinstance(data, Mapping):
         return {_key(key, place, lenient): inside(value, f"[{key!r}]") for key, value in data.items()}
     if isinstance(data, float) and not math.isfinite(data) and not lenient:
-        raise InvalidInputError(
-            f"{place} must be finite, got {data}: JSON has no such number; leave it out or write None"
-        )
+        raise InvalidInputError(f"{place} must be finite, got {data}, which JSON has not: write None")
     if isinstance(data, float):
         return data if math.isfinite(data) else None
     if data is None or isinstance(data, str | bool | int):
@@ -198,8 +196,7 @@ def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
     if lenient:
         return _named(data)
     raise InvalidInputError(
-        f"{place} must be a mapping, sequence, string, number, truth value, None or array, got a "
-        f"{type(data).__name__}: convert it first"
+        f"{place} must be a mapping, sequence, string, number, bool, None or array, got {type(data).__name__}"
     )
 
 
@@ -253,8 +250,7 @@ def only_run_in(folder: str | Path, comm: MPI.Comm) -> Iterator[None]:
             except (OSError, ValueError) as error:
                 reason = getattr(error, "strerror", None) or error
                 raise OutputError(
-                    f"results must be written to the folder {str(folder)!r}, which cannot be done: {reason}. "
-                    "Make it writable or give another one"
+                    f"results cannot be written to the folder {str(folder)!r}: {reason}. Make it writable"
                 ) from error
     try:
         yield

@@ -58,9 +58,7 @@ class StoredFields:
         import pyvista
 
         if not self.file.is_file():
-            raise InvalidInputError(
-                f"a file of fields must exist, '{self.file}' does not: write the result again"
-            )
+            raise InvalidInputError(f"a file of fields must exist, '{self.file}' does not: write it again")
         data = pyvista.read(self.file)
         if isinstance(data, pyvista.MultiBlock):
             return {str(name): data[name] for name in data.keys()}
@@ -170,14 +168,9 @@ def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) ->
 def checked_name(folder: str | Path, name: str, suffix: str) -> Path:
     """Return the path of a file name in a folder."""
     if not name.strip(".") or Path(name).name != name:
-        raise InvalidInputError(
-            f"name must be the beginning of a file's name, got {name!r}: put folders into folder"
-        )
+        raise InvalidInputError(f"name must be the beginning of a file's name, got {name!r}: use folder=")
     if len(os.fsencode(name)) > LONGEST:
-        raise InvalidInputError(
-            f"name must have at most {LONGEST} bytes, as disks take no longer ones with what is added to it, "
-            f"got {len(os.fsencode(name))}: give a shorter one"
-        )
+        raise InvalidInputError(f"name must have at most {LONGEST} bytes, got {len(os.fsencode(name))}")
     return Path(folder) / f"{name}{suffix}"
 
 
@@ -248,8 +241,7 @@ def _checked(
         if arrays[name].shape[:1] != (count,):
             given = f"shape {arrays[name].shape}" if body in values else "none"
             raise InvalidInputError(
-                f"the cell field {name!r} must have {count} rows for body {body!r}, one per cell, got "
-                f"{given}: give every body an array in the order of the cells of its mesh"
+                f"the cell field {name!r} must have {count} rows for body {body!r}, one per cell, got {given}"
             )
     return arrays
 
@@ -307,9 +299,7 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
     """
     base = Path(path)
     if base.suffix != ".xdmf":
-        raise InvalidInputError(
-            f"the file must be an XDMF file, got the name {base.name!r}: let it end in '.xdmf'"
-        )
+        raise InvalidInputError(f"the file must be an XDMF file, got the name {base.name!r}: use .xdmf")
     files = file_of_each(state.scene.deforming, base.parent, base.stem, ".xdmf")
     for name, target in files.items():
         _write_xdmf(state.torn.decomposition.comm, target, state.displacement[name], state.von_mises[name])
@@ -504,18 +494,13 @@ class ResultSeries:
 def _check_formats(formats: Sequence[str]) -> None:
     unknown = [name for name in formats if name not in FORMATS]
     if unknown or isinstance(formats, str):
-        raise InvalidInputError(
-            f"formats must be some of {list(FORMATS)}, got {formats!r}: give a tuple such as ('vtu', 'xdmf')"
-        )
+        raise InvalidInputError(f"formats must be some of {list(FORMATS)}, got {formats!r}")
 
 
 def _finite(value: float, label: str) -> float:
     number = float(value)
     if not math.isfinite(number):
-        raise InvalidInputError(
-            f"the value of a member must be finite, got {number}: give the time, the load factor or the "
-            "number of the step"
-        )
+        raise InvalidInputError(f"the value of a member must be finite, got {number}: give its time or step")
     if not label.isprintable():
         raise InvalidInputError(f"the label of a member must be one line of text, got {label!r}: shorten it")
     return number

@@ -383,8 +383,7 @@ evaluation; None where a trial point was rejected as invalid |
         target = checked_name(folder, name, ".json")
         if first is None or best is None:
             raise InvalidInputError(
-                "an optimisation's result needs designs that were evaluated, the problem has none: give the "
-                "problem that was handed to minimize"
+                "an optimisation's result needs designs that were evaluated, the problem has none"
             )
         record = {**_head("optimisation", comm), **_state_record(best.state, unheld), **read_off}
         record["counts"]["f_products"] = problem.products
@@ -567,19 +566,16 @@ def read_result(path: str | Path) -> dict[str, Any]:
         data = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise InvalidInputError(
-            f"a result is needed at {str(file)!r}, which cannot be read: {error.strerror or error}; give the "
-            "file that write_result returned, or its folder"
+            f"a result is needed at {str(file)!r}, which cannot be read: {error.strerror or error}"
         ) from error
     except ValueError as error:  # of JSON or of the encoding
         raise InvalidInputError(
-            f"a result must be a whole JSON file, {str(file)!r} is not one ({error}): it was cut or edited; "
-            "restore a copy or write it again"
+            f"a result must be a whole JSON file, {str(file)!r} is not one ({error}): it was cut or edited"
         ) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         kind = data.get("format") if isinstance(data, dict) else None
         raise InvalidInputError(
-            f'a result must have "format": {FORMAT!r}, {str(file)!r} has {kind!r}: give a file that '
-            "write_result or write_optimisation_result wrote"
+            f'a result must have "format": {FORMAT!r}, {str(file)!r} has {kind!r}: give one of write_result'
         )
     version = data.get("format_version")
     if not isinstance(version, int) or version < 1:

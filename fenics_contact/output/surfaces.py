@@ -35,8 +35,7 @@ def moved_surfaces(problem: ShapeProblem | JointProblem, alpha: np.ndarray) -> t
         if off > CLOSE * float(np.ptp(at, axis=0).max()):
             raise InvalidInputError(
                 f"a surface in a file must be moved by one design, that on {design.body!r} is moved by "
-                f"{off:.3g} by another one, too: let the designs share no nodes, or give them narrower "
-                "transitions"
+                f"{off:.3g} by another, too: let designs share no nodes, or narrow their transitions"
             )
         found.append(surface)
     return tuple(found)
@@ -48,9 +47,7 @@ def moved_body(
     """Return name and mesh of a designed body, None for the only one, in a design's shape. Collective."""
     designed = sorted({design.body for design in problem.designs})
     if body not in designed and (body is not None or len(designed) > 1):
-        raise InvalidInputError(
-            f"the body must be one that a design moves, got {body!r}: name one of {designed}"
-        )
+        raise InvalidInputError(f"the body must be one of {designed}, which designs move, got {body!r}")
     name = designed[0] if body is None else body
     return name, problem.scene_of(alpha).bodies[name].mesh
 
@@ -106,8 +103,7 @@ def _places(surface: MovedSurface, lines: tuple[int, ...] | None) -> np.ndarray:
         return surface.parameters
     if len(lines) != len(surface.ticks) or min(lines) < 2:
         raise InvalidInputError(
-            f"a table needs a number of at least 2 lines along each of the {len(surface.ticks)} parameters, "
-            f"got {lines}: give a tuple such as {(51, 11)[: len(surface.ticks)]}"
+            f"a table needs at least 2 lines along each of the {len(surface.ticks)} parameters, got {lines}"
         )
     ticks = [np.linspace(0.0, 1.0, count) for count in lines]
     return tensor_grid(ticks)
@@ -161,8 +157,7 @@ def write_stl(
     with together(problem.comm):
         if problem.scene.dim == 2:
             raise InvalidInputError(
-                "an STL file has a body in space, the scene is plane: write its profile with "
-                "write_design_table"
+                "an STL needs a body in space, the scene is plane: write its profile by write_design_table"
             )
     _, mesh = moved_body(problem, alpha, body)
     with together(problem.comm):

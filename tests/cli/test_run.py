@@ -264,7 +264,7 @@ def test_a_picture_that_cannot_be_drawn_is_named_once_all_else_is_written(
     assert "no picture pressure.png: " in told.out
     assert "result.json, state.vtm, stress.png\n" in told.out
     assert (tmp_path / "stress.png").exists()
-    assert "error: the pictures that a scene file requests must be possible, pressure.png could" in told.err
+    assert "error: pictures that a scene file requests must be possible, pressure.png could" in told.err
     assert run("run", path, "-o", tmp_path, "--no-pictures") == 0
 
 
@@ -280,7 +280,7 @@ def test_without_the_libraries_for_pictures_requested_ones_are_missed(
     told = capsys.readouterr()
     assert "no pictures: pyvista is not installed\n" in told.out
     assert f"results in {tmp_path}/: result.json, state.vtm\n" in told.out
-    assert "must be possible, stress.png, pressure.png could not be drawn, everything else is" in told.err
+    assert "must be possible, stress.png, pressure.png could not be drawn, all else is" in told.err
     assert run("run", path, "-o", tmp_path, "--no-pictures") == 0
     path = scene(tmp_path, GOOD)
     assert run("run", path, "-o", tmp_path) == 0, "no picture is asked for"

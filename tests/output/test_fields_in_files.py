@@ -117,7 +117,7 @@ def test_vtu_files_hold_further_fields_of_the_cells(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("field", "message"),
     [
-        ({}, r"the cell field 'error' must have 192 rows for body 'block', one per cell, got none: give"),
+        ({}, r"the cell field 'error' must have 192 rows for body 'block', one per cell, got none"),
         ({"block": np.zeros(3)}, r"must have 192 rows for body 'block', one per cell, got shape \(3,\)"),
     ],
 )
@@ -288,5 +288,5 @@ def test_names_of_bodies_that_are_too_long_for_a_disk_become_different_short_one
         path.touch()
     assert files == file_of_each([long, f"{long}c"], tmp_path, "state_0001", ".vtu")
     assert files[long] not in file_of_each([long], tmp_path, "state_0002", ".vtu").values()
-    with pytest.raises(InvalidInputError, match=r"name must have at most 200 bytes, .* got 300: give"):
+    with pytest.raises(InvalidInputError, match=r"name must have at most 200 bytes, got 300"):
         checked_name(tmp_path, long, ".vtu")

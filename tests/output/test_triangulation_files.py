@@ -35,7 +35,7 @@ def test_quadrilaterals_are_halved(tmp_path: Path) -> None:
         (
             [("line", SIDES[:, :2])],
             1.0,
-            r"file '.*tool.vtu' must hold the triangles of .* surface, it has line",
+            r"file '.*tool.vtu' must hold the triangles of .* surface .*, it has line",
         ),
         ([("triangle", SIDES)], -1.0, r"scale must be a positive number, got -1.0"),
     ],

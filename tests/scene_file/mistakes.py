@@ -132,8 +132,7 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         'value = ["open(x)", 0.0, -100.0]',
         "scene.toml, line 35: loads.0.value: a formula may hold numbers, x, y, z, t, pi, e, + - * / **, "
         "comparisons with < <= > >=, and abs, acos, asin, atan, atan2, cos, cosh, exp, log, max, min, sign, "
-        "sin, sinh, sqrt, tan, tanh, where, got 'open(x)' in 'open(x)': leave it out, or give the value by a "
-        "scene in Python",
+        "sin, sinh, sqrt, tan, tanh, where, got 'open(x)' in 'open(x)': leave it out",
     ),
     "a sum is fine, brackets are too many": (
         "value = [10.0, 0.0, -100.0]",
@@ -141,15 +140,13 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "scene.toml, line 35: loads.0.value: a formula may hold numbers, x, y, z, t, pi, e, + - * / **, "
         "comparisons with < <= > >=, and abs, acos, asin, atan, atan2, cos, cosh, exp, log, max, min, "
         "sign, sin, sinh, sqrt, tan, tanh, where, got 'more than 50 nested operations' in "
-        "'abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(a...': leave it out, or give the value "
-        "by a scene in Python",
+        "'abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(a...': leave it out",
     ),
     "a formula has no value": (
         "value = [10.0, 0.0, -100.0]",
         'value = ["1/0", 0.0, -100.0]',
         "scene.toml, line 35: loads.0.value: the formula '1/0' must have a finite value at every node, "
-        "got inf at (0.5, 0.5, 2): choose another one there with where(condition, a, b), each of whose "
-        "values may be infinite where the other is taken",
+        "got inf at (0.5, 0.5, 2): choose another one there with where(condition, a, b)",
     ),
     "a number has four hundred digits": (
         "2.1e5",

@@ -36,7 +36,7 @@ def test_bodies_come_from_mesh_files() -> None:
     with pytest.raises(SceneFileError, match="labels and corners_only are for other formats than"):
         mesh_from_file({"file": str(data), "labels": "sets"})
     with pytest.raises(
-        SceneFileError, match=r"size, sizes and order are for CAD files \(.step, .*: leave it away, or mesh"
+        SceneFileError, match=r"size, sizes and order are for CAD files \(.step, .*: leave it out"
     ):
         mesh_from_file({"file": str(data), "size": 1.0})
 
@@ -66,9 +66,7 @@ def test_bodies_come_from_cad_files_with_their_shapes(tmp_path: Path) -> None:
         with pytest.raises(SceneFileError, match=words):
             mesh_from_file({**mesh, "surfaces": {"x": wrong}})
     data = ROOT / "tests" / "data" / "two_boxes_41.msh"
-    with pytest.raises(
-        SceneFileError, match=r"faces are chosen by where they lie in CAD files .*: choose groups"
-    ):
+    with pytest.raises(SceneFileError, match=r"faces are chosen by place in CAD files .*: choose groups"):
         mesh_from_file({"file": str(data), "surfaces": by_place})
     curved = mesh_from_file({**mesh, "order": 2})
     assert (curved.cell_type, found.cell_type) == ("tetrahedron10", "tetrahedron")

@@ -71,7 +71,7 @@ def test_several_mistakes_are_all_listed_in_the_order_of_their_lines(tmp_path: P
         (
             "[solver]",
             "[[steps]]\ncount = 60_000\n[[steps]]\ncount = 60_000\n[solver]",
-            "line 42: steps: a file may have at most 100000 load steps in all, got 120000",
+            "line 42: steps: a file may have at most 100000 load steps, got 120000",
         ),
         (
             "[[loads]]",
@@ -88,7 +88,7 @@ def test_several_mistakes_are_all_listed_in_the_order_of_their_lines(tmp_path: P
             "master = { obstacle = 'distance', formula = '1/0' } #",
             "line 39: contacts.0.master.formula",
         ),
-        ("value = [10.0,", "value = ['x # y',", "loads.0.value: a formula must be arithmetic"),
+        ("value = [10.0,", "value = ['x # y',", "loads.0.value: a formula must be like '0.1 * x**2', got"),
         ("value = [10.0,", "value = ['1e400',", "loads.0.value: a formula may hold numbers"),
         ("2.1e5", "1" + 5000 * "0", "line 16: must be TOML, got 'young_modulus = 1000"),
         (
@@ -186,7 +186,7 @@ def test_a_file_that_is_not_there_is_named() -> None:
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_bytes(b"title = '\xff\xfe'")
-    with pytest.raises(InvalidInputError, match="must be readable UTF-8 text"):
+    with pytest.raises(InvalidInputError, match="must be UTF-8"):
         read_scene_file(path, MPI.COMM_SELF)
 
 

@@ -220,7 +220,7 @@ def test_some_steps_count_and_another_objective_is_limited_after_one() -> None:
 @pytest.mark.parametrize(
     ("text", "more", "said"),
     [
-        (GOOD, {"over_steps": ["push"]}, "names of load steps, but the file has none"),
+        (GOOD, {"over_steps": ["push"]}, "name load steps, the file has none"),
         (STEPS, {"over_steps": ["push"]}, r"those of some of the steps \['pressed'"),
         (STEPS, {"over_steps": ["pressed"]}, "the last step needs an objective"),
         (STEPS, {"adaptive": True}, "all solved to one tolerance"),

@@ -91,7 +91,7 @@ def test_steps_change_what_drives_a_tool() -> None:
         ),
         (
             {"contacts": [{**ON_BALL, "master": {**BALL, "motion": [0, 0, 0, 0, 0, 0]}}]},
-            r"contacts\.0: the tool 'ball' must have the point 'about' .* and no motion",
+            r"contacts\.0: the tool 'ball' needs the point 'about' .* and no motion",
         ),
         (
             {"supports": [{**DRIVEN, "name": "d"}], "steps": [{"supports": {"d": [0, 0, 0, 0, 0, 0]}}]},
