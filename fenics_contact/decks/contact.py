@@ -13,7 +13,7 @@ from fenics_contact._scene.pairs import Coulomb, Surface
 from fenics_contact._scene.sectors import CyclicSymmetry
 from fenics_contact._scene.surface_laws import ClosureLaw, ClosureTable, ExponentialClosure, LinearClosure
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.readers.deck_cards import Card
+from fenics_contact.readers.deck_cards import AtLine, Card
 
 #: Keeps what is worth knowing of a card.
 Note: TypeAlias = Callable[[Card, str], None]
@@ -65,14 +65,14 @@ class Around:
         angle = made.measured_angle(meshes[slave.body], meshes[master.body])
         if abs(2.0 * np.pi / abs(angle) - self.count) > 0.5:
             raise self.card.error(
-                f"N={self.count:g} sectors are 360°/N apart, but {master.in_words} is "
+                f"N={self.count:g} sectors are 360°/N apart, {master.in_words} is "
                 f"{abs(np.degrees(angle)):.6g}° from {slave.in_words}: correct N, the axis or the surfaces"
             )
         return replace(made, angle=angle)
 
 
 @dataclass(frozen=True)
-class Sides:
+class Sides(AtLine):
     """Two surfaces by name, and the card that names them.
 
     `tied`: whether they stay together; `around`: the axis of a sector, of which they are both sides.
@@ -141,8 +141,8 @@ def closure_of(interaction: Interaction, note: Note) -> ClosureLaw | None:
         start = max(int(np.count_nonzero(pressures <= 0.0)) - 1, 0)
         return ClosureTable(tuple(closures[start:].tolist()), tuple(pressures[start:].tolist()))
     raise card.error(
-        f"PRESSURE-OVERCLOSURE={kind} with {len(numbers)} numbers is not read: HARD, LINEAR (slope), "
-        "EXPONENTIAL (clearance, pressure), TABULAR (pressure, overclosure) and TIED are"
+        f"PRESSURE-OVERCLOSURE={kind} with {len(numbers)} numbers is not read: give HARD, LINEAR (slope), "
+        "EXPONENTIAL (clearance, pressure), TABULAR (pressure, overclosure) or TIED"
     )
 
 

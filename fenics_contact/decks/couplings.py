@@ -52,9 +52,7 @@ def read_driven(cards: Sequence[Card], mesh: DeckMesh) -> list[Driven]:
                 raise card.error("must be followed by *KINEMATIC or *DISTRIBUTING: add one")
             held = {c for row in range(len(kind.lines)) for c in _range(kind, row)} or set(range(1, 7))
             if kind.name == "KINEMATIC" and not {1, 2, 3} <= held:
-                raise kind.error(
-                    "a surface moves as one piece where components 1 to 3 are coupled, got others"
-                )
+                raise kind.error("a surface moves as one piece where components 1 to 3 are coupled")
             node = mesh.nodes_named(card.required("REFNODE"), card)[0]
             surface = card.required("SURFACE")
             mesh.surface_named(surface, card)
@@ -70,16 +68,13 @@ def by_node(driven: Sequence[Driven], mesh: DeckMesh) -> list[list[Driven]]:
     for each in driven:
         others = found.setdefault(each.node, [])
         if others and (each.spread or others[0].spread):
-            raise each.card.error(
-                f"node {mesh.numbers[each.node]} of a distributing coupling is also that of "
-                f"{others[0].name!r}: give it a node of its own"
-            )
+            node = mesh.numbers[each.node]
+            raise each.card.error(f"node {node} of a distributing coupling is also of {others[0].name!r}")
         first = turned.setdefault(each.turning, each) if each.turning >= 0 else each
         for other in (*others[:1], first):
             if (other.node, other.turning) != (each.node, each.turning):
                 raise each.card.error(
-                    f"{each.name!r} must share both REF NODE and ROT NODE with {other.name!r}, or neither: "
-                    "correct them"
+                    f"{each.name!r} must share REF NODE and ROT NODE with {other.name!r}, or neither"
                 )
         others.append(each)
     return list(found.values())
@@ -90,9 +85,7 @@ def require_own_nodes(users: Sequence[tuple[Card, int]], mesh: DeckMesh) -> None
     seen = set[int]()
     for card, node in users:
         if node in seen:
-            raise card.error(
-                f"node {mesh.numbers[node]} is used by a card before: give each a node of its own"
-            )
+            raise card.error(f"node {mesh.numbers[node]} is used by a card before: give each its own")
         seen.add(node)
 
 
@@ -210,10 +203,8 @@ class LocalAxes:
                 wrong = np.isnan(held[:, 0]) != np.isnan(held[:, 1])
                 wrong |= np.nan_to_num(held).any(axis=1) | force.any(axis=1)
                 if wrong.any():
-                    raise card.error(
-                        f"node {self.mesh.numbers[nodes[wrong][0]]} is on the axis of the cylinder: hold "
-                        "components 1 and 2 both at zero"
-                    )
+                    node = self.mesh.numbers[nodes[wrong][0]]
+                    raise card.error(f"node {node} is on the axis of the cylinder: hold 1 and 2 at zero")
 
 
 def read_axes(cards: Sequence[Card], mesh: DeckMesh) -> LocalAxes:

@@ -96,9 +96,7 @@ class Deck:
         """
         if (part, name) not in self._origins:
             known = ", ".join(repr(key) for kind, key in self._origins if kind == part) or "none"
-            raise InvalidInputError(
-                f"the deck {self.name} says of {part!r}: {known}; got {name!r}: name one of them"
-            )
+            raise InvalidInputError(f"the deck {self.name} says of {part!r}: {known}; got {name!r}")
         return self._origins[part, name]
 
     @property
@@ -247,10 +245,7 @@ def _leading_statics(cards: Sequence[Card]) -> tuple[Sequence[Card], Sequence[Ca
             begin, steps = place, steps + 1
         other = card.name in PROCEDURES or (card.name == "STEP" and "PERTURBATION" in card.parameters)
         if other and steps == 1:
-            raise card.error(
-                "the first step is not static: nothing remains with statics_only; start the deck with a "
-                "*STATIC step"
-            )
+            raise card.error("the first step is not static: nothing remains; start with a *STATIC step")
         if other and steps:
             return cards[:begin], [card, *cards[place:]]
     return cards, []

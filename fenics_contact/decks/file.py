@@ -79,7 +79,7 @@ def read_deck_file(
         if key in OWN:
             raise InvalidInputError(
                 f"--set changes solver, accuracy, output, units and title of a deck, got {override!r}: "
-                "change the deck, or make a scene file of it with `fenics-contact convert`"
+                "make a scene file of it with `fenics-contact convert`"
             )
     source = Source(path.name, path.parent, _NOTHING).with_overrides(overrides)
     document = validated(source)

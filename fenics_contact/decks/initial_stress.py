@@ -42,9 +42,7 @@ def read_initial(
         if widths == {8}:
             _at_points(card, mesh, stress, note)
         elif 8 in widths:
-            raise card.error(
-                "lines must all have integration points, or none, got both: make two cards of them"
-            )
+            raise card.error("lines must all have integration points, or none, got both: make two cards")
         else:
             for row, entries in enumerate(card.rows):
                 numbers = card.floats(row, 1)
@@ -65,8 +63,7 @@ def relieved(strain: np.ndarray, material: Material, card: Card) -> np.ndarray:
     """Return the stresses −C : ε of bodies that are held, of plastic strains, both (n, 6)."""
     if not isinstance(material, IsotropicElasticity | PlaneStrain):
         raise card.error(
-            f"plastic strains need isotropic elasticity without NLGEOM, got {type(material).__name__}: "
-            "leave them out"
+            f"plastic strains need isotropic elasticity without NLGEOM, got {type(material).__name__}"
         )
     first, shear = lame(material.young_modulus, material.poisson_ratio)
     stress = -2 * shear * strain

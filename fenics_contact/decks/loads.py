@@ -73,8 +73,7 @@ class LoadBuilder:
                 continue
             if any(map(is_nonlinear, body.materials)):
                 raise deck.stress.card.error(
-                    f"initial stresses need linear materials without NLGEOM, got {body.in_words}: leave "
-                    "them out"
+                    f"initial stresses need linear materials without NLGEOM, got {body.in_words}"
                 )
             value: Any = tuple(stress[0].tolist())
             if np.ptp(stress, axis=0).any():
@@ -86,13 +85,10 @@ class LoadBuilder:
         body, *others = self.built.bodies_with(name)
         if others:
             raise driven.card.error(
-                f"a distributing coupling must load one body, {driven.name!r} is also on "
-                f"{', '.join(others)}: give one for each"
+                f"a distributing coupling must load one body, {driven.name!r} is also on {', '.join(others)}"
             )
         if not np.isnan(driven.row(instant.held)).all():
-            raise driven.card.error(
-                "the node of a distributing coupling is held: use *KINEMATIC for displacements"
-            )
+            raise driven.card.error("the node of a distributing coupling is held: take *KINEMATIC")
         dim, load = self.built.deck.dim, driven.row(instant.forces).tolist()
         at = self.built.deck.mesh.points[driven.node, :dim]
         moment: Any = tuple(load[3:]) if dim == 3 else load[5]
@@ -120,7 +116,7 @@ class LoadBuilder:
         density = self.built.deck.materials[name].density
         if not density:
             needed = f"{weight.where[1]} needs a *DENSITY of material {name}: add it"
-            raise weight.card.error(needed, weight.row)
+            raise weight.error(needed)
         return density
 
     def _check_direction(self, weight: Acting, numbers: np.ndarray) -> None:
@@ -132,10 +128,7 @@ class LoadBuilder:
         across = along[[0, 2]] if revolved else along[:2] if spins else along[2:]
         if across.any() or (revolved and spins and point[0]):
             needed = "the axis of revolution, y" if revolved else "z" if spins else "the plane"
-            raise weight.card.error(
-                f"{weight.where[1]} here must be along {needed}, got {numbers.tolist()}: correct it",
-                weight.row,
-            )
+            raise weight.error(f"{weight.where[1]} here must be along {needed}, got {numbers.tolist()}")
 
     def _weight(self, weight: Acting, part: Component, density: float, region: str | None) -> BodyForce:
         numbers = np.array(weight.numbers)

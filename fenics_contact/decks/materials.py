@@ -129,17 +129,13 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
             if name in parts or name == "NLGEOM" * of.large
         ]
         if of.thickness is not None and stiff:
-            raise cards.card.error(
-                f"plane bodies of several thicknesses with {stiff[0]} are not supported: give one thickness"
-            )
+            raise cards.card.error(f"plane bodies of several thicknesses with {stiff[0]} are not supported")
         for name, build in WITHOUT_ELASTIC.items():
             if name in parts:
                 return build(parts, of)
         if "ELASTIC" not in parts:
-            raise cards.card.error(
-                "needs *ELASTIC or *HYPERELASTIC behind it, has "
-                f"{', '.join('*' + part.written for part in parts.values()) or 'nothing'}: add one"
-            )
+            given = ", ".join("*" + part.written for part in parts.values()) or "nothing"
+            raise cards.card.error(f"needs *ELASTIC or *HYPERELASTIC behind it, has {given}")
         kind = parts["ELASTIC"].name_of("TYPE") or "ISO"
         if kind in ("ISO", "ISOTROPIC"):
             return _isotropic(parts, of)
@@ -147,9 +143,7 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
             kind = "ANISO"
         if "PLASTIC" in parts or of.large:
             what = "*PLASTIC" if "PLASTIC" in parts else "NLGEOM"
-            raise parts["ELASTIC"].error(
-                f"TYPE={kind} with {what} is not supported: give isotropic constants"
-            )
+            raise parts["ELASTIC"].error(f"TYPE={kind} with {what} is not supported: give ISO")
         return (_anisotropic if kind == "ANISO" else _orthotropic)(parts, kind, axes, of)
     except InvalidInputError as error:
         if getattr(error, "card", ""):
@@ -159,10 +153,7 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
 
 def _row(card: Card, width: int, of: Conditions, what: str) -> list[float]:
     if of.temperature is None and depends_on_temperature(card, width):
-        raise card.error(
-            "constants of this material must not depend on the temperature: give those for the mean "
-            "temperature"
-        )
+        raise card.error("constants of this material must not depend on the temperature: give their mean")
     return row_at(card, width, of.temperature or 0.0, what)
 
 
@@ -200,9 +191,7 @@ def _by_temperature(parts: Mapping[str, Card], of: Conditions) -> Material:
     card = parts["ELASTIC"]
     if of.initial is None or of.thickness is not None:
         what = "several initial temperatures" if of.initial is None else "several thicknesses"
-        raise card.error(
-            f"constants that depend on the temperature are not supported with {what}: give one of them"
-        )
+        raise card.error(f"constants that depend on the temperature are not supported with {what}")
     young, poisson = (_curve_of(card, 2, column) for column in range(2))
     expansion: ByTemperature | None = 0.0 if of.expands else None
     zero = 0.0
@@ -247,8 +236,7 @@ def _plastic(parts: Mapping[str, Card], young: float, poisson: float, of: Condit
         raise card.error(f"HARDENING must be ISOTROPIC, KINEMATIC or COMBINED, got {kind}: give one of them")
     if (kind == "COMBINED") != ("CYCLICHARDENING" in parts):
         raise card.error(
-            f"HARDENING=COMBINED and *CYCLIC HARDENING need each other, got {kind} "
-            f"{'with' if kind != 'COMBINED' else 'without'} the other: give both or neither"
+            f"HARDENING=COMBINED and *CYCLIC HARDENING need each other, got {kind}: give both or neither"
         )
     first, rest = _curve(card)
     own: dict[str, Any] = {"hardening_curve": rest}
@@ -276,9 +264,7 @@ def _curve(card: Card) -> tuple[float, Points]:
     if np.ptp(rows[:, 2]) > 0.0:
         raise card.error("a yield stress that depends on the temperature is not read: give one temperature")
     if rows[0, 1] != 0.0:
-        raise card.error(
-            f"a table must begin at plastic strain zero, the first is {rows[0, 1]:g}: add the yield stress", 0
-        )
+        raise card.error(f"a table must begin at plastic strain zero, the first is {rows[0, 1]:g}", 0)
     return float(rows[0, 0]), tuple((float(strain), float(stress)) for stress, strain, _ in rows[1:])
 
 
@@ -310,10 +296,7 @@ def _compliance(card: Card, moduli: np.ndarray, least: float = 1e-12) -> np.ndar
     """Return the inverse of stiffnesses, (3, 3), which must store energy in every stretch."""
     size = np.linalg.eigvalsh(moduli)
     if not size[0] > least * size[-1]:
-        raise card.error(
-            f"stiffnesses must be positive definite, got the smallest eigenvalue {size[0]:.3g}: increase "
-            "small ones"
-        )
+        raise card.error(f"stiffnesses must be positive definite, got the smallest eigenvalue {size[0]:.3g}")
     return np.asarray(np.linalg.inv(moduli))
 
 
@@ -364,10 +347,8 @@ def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:
         exponents, own = tuple(map(float, pairs[:, 1])), _heated(parts, of)
         return Ogden(moduli, exponents, bulk, mean_dilatation=of.dilatation, **own)
     else:
-        raise card.error(
-            f"the model {', '.join(sorted(flags)) or 'POLYNOMIAL'} is not supported: give NEO HOOKE, "
-            "MOONEY-RIVLIN or OGDEN"
-        )
+        model = ", ".join(sorted(flags)) or "POLYNOMIAL"
+        raise card.error(f"{model} is not supported: give NEO HOOKE, MOONEY-RIVLIN or OGDEN")
     bulk = _bulk(d1, 2.0 * (c10 + c01))
     return MooneyRivlin(c10, c01, bulk, mean_dilatation=of.dilatation, **_heated(parts, of))
 

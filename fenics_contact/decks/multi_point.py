@@ -8,12 +8,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from fenics_contact.readers.deck_cards import Card
+from fenics_contact.readers.deck_cards import AtLine, Card
 from fenics_contact.readers.deck_mesh import DeckMesh
 
 
 @dataclass(frozen=True, eq=False)
-class Equation:
+class Equation(AtLine):
     """A linear equation between components, from zero, of nodes: Σ c u = 0."""
 
     card: Card
@@ -40,9 +40,7 @@ def read_equations(cards: Sequence[Card], mesh: DeckMesh) -> list[Equation]:
             while len(entries) < 3 * count:
                 row += 1
                 if row == len(card.rows):
-                    raise card.error(
-                        f"needs {count} terms of node, component and factor: complete them", first
-                    )
+                    raise card.error(f"needs {count} terms of node, component and factor", first)
                 entries += [entry for entry in card.rows[row] if entry]
             nodes = [mesh.nodes_named(token, card, row) for token in entries[: 3 * count : 3]]
             if any(len(each) != 1 for each in nodes):
@@ -118,15 +116,10 @@ def read_points(cards: Sequence[Card], mesh: DeckMesh, large: bool) -> list[Equa
             kind = entries[0].upper()
             if kind not in _KINDS:
                 raise card.error(
-                    f"a multi-point constraint {kind} is not read: {', '.join(_KINDS)} are, which are linear "
-                    "for small displacements", row,
-                )  # fmt: skip
-            if large and kind not in ("PIN", "TIE"):
-                raise card.error(
-                    f"{kind} is not supported with NLGEOM: leave that out, or drive a rigid surface by "
-                    "*RIGID BODY",
-                    row,
+                    f"a multi-point constraint {kind} is not read: give {', '.join(_KINDS)}", row
                 )
+            if large and kind not in ("PIN", "TIE"):
+                raise card.error(f"{kind} is not supported with NLGEOM: use *RIGID BODY", row)
             nodes = np.concatenate([mesh.nodes_named(token, card, row) for token in entries[1:]])
             least, rows_of = _KINDS[kind]
             if len(nodes) < least:

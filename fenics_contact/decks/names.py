@@ -159,10 +159,9 @@ class _Naming:
         """Name the faces of one side."""
         faces, nodes = self._given(name, of)
         if not len(faces):
-            raise of.card.error(
-                f"contact is between faces, but the {len(nodes)} nodes of {name!r} are not all nodes of some "
-                "faces: give the faces, as *SURFACE with TYPE=ELEMENT", of.row,
-            )  # fmt: skip
+            raise of.error(
+                f"the {len(nodes)} nodes of {name!r} are not all nodes of some faces: give TYPE=ELEMENT"
+            )
         self.deck.exterior.require(faces, of.card, of.row, f"surface {name!r} must lie", "correct it")
         self.surfaces[name] = faces
         return name
@@ -208,7 +207,7 @@ class _Naming:
             for each in several:
                 if self.deck.axes.turned(np.array([each.node, each.turning])).any():
                     raise each.card.error(
-                        "the node of a rigid surface must not have a *TRANSFORM: leave it out of that set"
+                        "the node of a rigid surface must not have a *TRANSFORM: leave it out"
                     )
             parts = [self._part(each) for each in several]
             name = " AND ".join(dict.fromkeys(name for name, _, _ in parts))
@@ -243,8 +242,7 @@ class _Naming:
             faces = self._whole(driven)
         if not len(faces) or not exterior.holds(faces).all():
             raise driven.card.error(
-                f"{driven.name!r} must be faces on the boundary of a body, or all nodes of some: give such "
-                "a set"
+                f"{driven.name!r} must be faces on the boundary of a body, or all nodes of some"
             )
         return name, faces, none
 
@@ -281,10 +279,7 @@ class _Naming:
                 other = taken.setdefault(key, name)
                 if other != name:
                     number = self.mesh.element_numbers[key[0]]
-                    raise first.card.error(
-                        f"a face of element {number} is loaded by {other!r} and {name!r}: load it once",
-                        first.row,
-                    )
+                    raise first.error(f"a face of element {number} is loaded by {other!r} and {name!r}")
             self.surfaces[name] = faces
             self.deck.record.origins["load", name] = first.card.origin
             found.update((each.where, name) for each in several)
@@ -318,9 +313,7 @@ class _Naming:
             return self.mesh.faces_of(elements, pressed.where[1], card, row)
         given = self.mesh.surface_named(pressed.where[0], card, row)
         if len(given.nodes):
-            raise card.error(
-                "a pressure needs a surface of faces, this one has nodes: give TYPE=ELEMENT", row
-            )
+            raise card.error("a pressure needs a surface of faces, this has nodes: give TYPE=ELEMENT", row)
         return given.faces
 
     def surfaces_of_deck(self) -> None:
@@ -347,8 +340,7 @@ class _Naming:
                 turned = np.flatnonzero(instant.forces[:, 3:].any(axis=1) & ~deck.references)
                 if len(turned):
                     raise step.card.error(
-                        f"node {self.mesh.numbers[turned[0]]} of a solid takes no moment: load a surface by "
-                        "*COUPLING"
+                        f"node {self.mesh.numbers[turned[0]]} of a solid takes no moment: use *COUPLING"
                     )
                 _check_plane_forces(deck, step.card, instant.forces)
                 loose = deck.inside & ~deck.references
@@ -374,10 +366,8 @@ def _check_target(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.nda
     driving = {node for driven in deck.driven for node in (driven.node, driven.turning)}
     here = [node for node in target.nodes.tolist() if node in driving]
     if any(at.kept[node, list(target.components)].any() for at in steps.instants for node in here):
-        raise target.card.error(
-            f"node {deck.mesh.numbers[here[0]]} drives a surface and was free before FIXED: give its "
-            "displacement",
-            target.row,
+        raise target.error(
+            f"node {deck.mesh.numbers[here[0]]} drives a surface and was free before FIXED: give a value"
         )
 
 
@@ -387,9 +377,7 @@ def _check_turns(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.ndar
     free = nodes[~deck.references[nodes]]
     if turned and any(np.nan_to_num(at.held[free][:, turned]).any() for at in steps.instants):
         name = target.label or deck.mesh.numbers[free[0]]
-        raise target.card.error(
-            f"{name} has no rotation that can be prescribed: use *RIGID BODY or *COUPLING", target.row
-        )
+        raise target.error(f"{name} has no rotation that can be prescribed: use *RIGID BODY")
 
 
 def _check_plane(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.ndarray) -> None:
@@ -406,10 +394,9 @@ def _check_plane(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.ndar
         node = int(turned[wrong][0])
         k = inner[int(abs(across[wrong][0] - np.equal(inner, 2)).argmax())]
         axis = ", ".join(f"{value:.4g}" for value in deck.axes.of(node)[k] + 0.0)
-        raise target.card.error(
-            f"axis {k + 1} of node {deck.mesh.numbers[node]}, ({axis}), must be in the plane or along z: "
-            "correct *TRANSFORM",
-            target.row,
+        number = deck.mesh.numbers[node]
+        raise target.error(
+            f"*TRANSFORM axis {k + 1} of node {number}, ({axis}), must be in the plane or along z"
         )
 
 
@@ -419,26 +406,20 @@ def _check_equation(deck: DeckCards, steps: DeckSteps, equation: Equation) -> No
     inside = deck.inside[at]
     turned = (components >= deck.dim) & inside
     if turned.any():
-        raise equation.card.error(
-            f"component {int(components[turned][0]) + 1} of a node of elements is no displacement: "
-            f"components 1 to {deck.dim} are", equation.row,
-        )  # fmt: skip
+        raise equation.error(
+            f"component {int(components[turned][0]) + 1} of a node of elements is no displacement"
+        )
     across = np.array([deck.axes.of(node)[k % 3, 2] for node, k in zip(at.tolist(), components, strict=True)])
     across = (abs(across) > 1e-9) & (components < 2) & (deck.dim == 2)
     if across.any():
         node, k = at[across][0], components[across][0]
-        raise equation.card.error(
-            f"axis {k + 1} of node {deck.mesh.numbers[node]} is out of the plane: correct *TRANSFORM",
-            equation.row,
-        )
+        raise equation.error(f"*TRANSFORM axis {k + 1} of node {deck.mesh.numbers[node]} is out of the plane")
     if not inside.any():
-        raise equation.card.error("needs a node of an element, this equation has none: add one", equation.row)
+        raise equation.error("needs a node of an element, this equation has none: add one")
     for node, component in zip(at[~inside], components[~inside], strict=True):
         if any(np.isnan(instant.held[node, component]) for instant in steps.instants):
-            raise equation.card.error(
-                f"node {deck.mesh.numbers[node]} belongs to no element: give component {component + 1} by "
-                "*BOUNDARY in all steps",
-                equation.row,
+            raise equation.error(
+                f"node {deck.mesh.numbers[node]} has no element: give component {component + 1} by *BOUNDARY"
             )
 
 
@@ -448,7 +429,4 @@ def _check_plane_forces(deck: DeckCards, card: Card, forces: np.ndarray) -> None
     wrong &= deck.references | deck.inside
     wrong |= deck.references & forces[:, 3:5].any(axis=1)
     if deck.dim == 2 and wrong.any():
-        raise card.error(
-            f"node {deck.mesh.numbers[np.flatnonzero(wrong)[0]]} has a *CLOAD out of the plane: correct its "
-            "components"
-        )
+        raise card.error(f"node {deck.mesh.numbers[np.flatnonzero(wrong)[0]]} has a *CLOAD out of the plane")

@@ -82,9 +82,7 @@ def _switched(card: Card, now: PairChange) -> frozenset[tuple[str, str]]:
     """Return the pairs that do not act after *MODEL CHANGE."""
     of_pairs = card.name_of("TYPE").replace(" ", "") == "CONTACTPAIR"
     if not of_pairs or ("REMOVE" in card.parameters) == ("ADD" in card.parameters):
-        raise card.error(
-            f"needs TYPE=CONTACT PAIR and REMOVE or ADD, got {card.given}: elements cannot be changed"
-        )
+        raise card.error(f"needs TYPE=CONTACT PAIR and REMOVE or ADD, got {card.given}")
     pairs = set()
     for row, entries in enumerate(card.rows):
         pair = tuple(entry.upper().strip('"') for entry in entries if entry)

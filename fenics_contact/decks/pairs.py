@@ -52,7 +52,7 @@ def pairs_of(built: DeckBodies) -> Pairs:
             except InvalidInputError as error:
                 if getattr(error, "card", ""):
                     raise
-                raise each.card.error(str(error), each.row) from error
+                raise each.error(str(error)) from error
     for kind, pairs in (("contact", contacts), ("tie", ties)):
         deck.record.origins.update({(kind, pair.place): of.card.origin for of, pair in pairs})  # type: ignore[attr-defined]
     left_out = {pair for change in deck.changes if change for pair in change.removed}
@@ -113,9 +113,7 @@ def _adjusted(built: DeckBodies) -> _Clearances:
         left = np.setdiff1d(own, chosen)
         if len(left):
             raise of.card.error(
-                f"ADJUST={name} must have all nodes of the slave, {len(left)} of {len(own)} are missing, "
-                "such "
-                f"as {mesh.numbers[left[0]]}: add them, or give a distance"
+                f"ADJUST={name} lacks {len(left)} of {len(own)} slave nodes: add them or give a distance"
             )
         found[of.slave, of.master] = of.card, 0.0
     return found

@@ -12,7 +12,7 @@ import numpy as np
 from fenics_contact.decks.initial_stress import kind_of
 from fenics_contact.decks.multi_point import Equation
 from fenics_contact.decks.vocabulary import PRINT_CARDS, PROCEDURES
-from fenics_contact.readers.deck_cards import Card, DeckError, plain
+from fenics_contact.readers.deck_cards import AtLine, Card, DeckError, plain
 from fenics_contact.readers.deck_mesh import DeckMesh
 
 
@@ -122,7 +122,7 @@ class Ramp:
 
 
 @dataclass(frozen=True)
-class Acting:
+class Acting(AtLine):
     """A pressure on faces, or a load on volumes: acceleration, or the square of an angular velocity.
 
     `where`: element set or element, and face or "GRAV" or "CENTRIF": ("TOP", "P2"); of a surface its name;
@@ -148,7 +148,7 @@ class Acting:
 
 
 @dataclass(frozen=True)
-class Held:
+class Held(AtLine):
     """Nodes that a card holds.
 
     `label`: name of the set, or number of the node; "" for single nodes; `value`: displacement or rotation,

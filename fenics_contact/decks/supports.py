@@ -78,9 +78,7 @@ class SupportBuilder:
         """Return a support that keeps what all of its nodes have."""
         if not kept.all():
             target = next(each for each in self.built.steps.targets if each.fixed)
-            raise target.card.error(
-                f"nodes of {name!r} that are FIXED were partly free before: make two sets of them", target.row
-            )
+            raise target.error(f"nodes of {name!r} that are FIXED were partly free before: make two sets")
         return HoldCurrent()
 
     def _always_zero(self, nodes: np.ndarray, held: Sequence[int]) -> bool:
@@ -174,8 +172,7 @@ class SupportBuilder:
         moved = None if steps.large else by_small_turns(points, leaders)
         if moved is None:
             raise driven.card.error(
-                f"nodes of {name!r} on one body do not show how it turns: hold the rotations of its node at "
-                "zero"
+                f"nodes of {name!r} on one body do not show how it turns: hold its rotations at zero"
             )
         return moved
 

@@ -360,7 +360,7 @@ class BodyMesh:
     @property
     def has_several_shapes(self) -> bool:
         """Whether some cells are prisms, pyramids or simplices among others, see `joined_cells`."""
-        return shapes_in(self.cells, self.dim) is not None
+        return bool(shapes_in(self.cells, self.dim))
 
     @cached_property
     def apart(self) -> tuple[np.ndarray, sp.csr_matrix | None]:

@@ -253,11 +253,11 @@ def _marks(cells: np.ndarray, dim: int) -> np.ndarray:
     return np.asarray(cells[:, -2 + len(kind.edges)] == cells[:, -1 + len(kind.edges)])
 
 
-def shapes_in(cells: np.ndarray, dim: int) -> dict[str, np.ndarray] | None:
-    """Return the cells of each shape, name to ascending numbers; None where all are of the cells' type."""
+def shapes_in(cells: np.ndarray, dim: int) -> dict[str, np.ndarray]:
+    """Return the cells of each shape, name to ascending numbers; empty where all are of the cells' type."""
     marks = _marks(cells, dim)
     if not marks.any():
-        return None
+        return {}
     groups = {"triangle" if dim == 2 else "": marks}
     if dim == 3:
         apex = cells[:, 4] == cells[:, 6]
@@ -272,7 +272,7 @@ def shapes_in(cells: np.ndarray, dim: int) -> dict[str, np.ndarray] | None:
 def check_collapsed(cells: np.ndarray, dim: int) -> None:
     """Reject cells that list nodes twice otherwise than prisms, pyramids and simplices do."""
     order = cell_type_of(cells, dim).order
-    for name, mine in (shapes_in(cells, dim) or {}).items():
+    for name, mine in shapes_in(cells, dim).items():
         _check_repeated(cells, mine, collapse(name, order))
 
 
@@ -334,7 +334,7 @@ def by_shape(cells: np.ndarray, dim: int) -> dict[str, tuple[np.ndarray, np.ndar
     """Return the shapes in an array of cells: name to cell numbers and node numbers in VTK order."""
     kind = cell_type_of(cells, dim)
     groups = shapes_in(cells, dim)
-    if groups is None:
+    if not groups:
         return {kind.shape_name: (np.arange(len(cells)), cells)}
     return {name: (mine, cells[mine][:, collapse(name, kind.order).places]) for name, mine in groups.items()}
 
@@ -350,7 +350,7 @@ def as_hexahedra(values: np.ndarray, cells: np.ndarray, dim: int) -> np.ndarray:
     kind = cell_type_of(cells, dim)
     if kind.order == 1:
         return result
-    for name, mine in (shapes_in(cells, dim) or {}).items():
+    for name, mine in shapes_in(cells, dim).items():
         if not SHAPES[name].is_whole:
             how = collapse(name, kind.order)
             result = result.copy() if result is values else result
@@ -365,7 +365,7 @@ def expanded(cells: np.ndarray, n_nodes: int, dim: int) -> tuple[np.ndarray, sp.
     matrix maps values at the given nodes to these.
     """
     groups = shapes_in(cells, dim)
-    if groups is None:
+    if not groups:
         return None
     order, width = cell_type_of(cells, dim).order, cells.shape[1]
     whole = groups.get(_WHOLE[dim][0].name, np.zeros(0, dtype=np.int64))
@@ -394,7 +394,7 @@ def in_words(cells: np.ndarray, dim: int, lacking: bool = False) -> str:
     `lacking`: whether centres follow, as in serendipity cells.
     """
     order, parts = cell_type_of(cells, dim).order, []
-    for name, mine in (shapes_in(cells, dim) or {}).items():
+    for name, mine in shapes_in(cells, dim).items():
         kind = "serendipity " if lacking and len(SHAPES[name].square_columns) else "quadratic "
         words = (kind * (order - 1) + word for word in (name, SHAPES[name].plural))
         parts.append(counted(len(mine), *words))
@@ -437,6 +437,6 @@ def cut_into_linear(cells: np.ndarray, dim: int) -> tuple[np.ndarray, np.ndarray
 def simplices_in(cells: np.ndarray, dim: int) -> np.ndarray:
     """Return the simplices that make up linear cells, (n, dim + 1)."""
     every = cells[:, cell_type_of(cells, dim).simplices].reshape(-1, dim + 1)
-    if shapes_in(cells, dim) is None:
+    if not shapes_in(cells, dim):
         return every
     return every[(np.diff(np.sort(every, axis=1), axis=1) > 0).all(axis=1)]

@@ -84,7 +84,7 @@ def with_more_nodes(
 
     Returns groups of the vertices around them, in the order of the numbers, and the cells.
     """
-    if shapes_in(cells, linear.dim) is not None:
+    if shapes_in(cells, linear.dim):
         return _with_nodes_of_shapes(count, cells, linear.dim)
     # The vertices whose linear shape functions are not zero there.
     weights = shape_values(linear, kind.nodes[len(linear.nodes) :])

@@ -69,7 +69,7 @@ def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | Non
         return determinants(corners[:, 1:] - corners[:, :1])[:, None]
     if positions is None or positions is AT_GAUSS_POINTS:
         positions = _critical_positions(cell) if positions is None else quadrature(cell)[0]
-        if (groups := shapes_in(cells, cell.dim)) is not None:
+        if groups := shapes_in(cells, cell.dim):
             return _of_shapes(points, cells, positions, groups)
     corners = places_of(points, cells)
     columns = np.ascontiguousarray(corners.transpose(0, 2, 1)).reshape(-1, cells.shape[1])
@@ -120,7 +120,7 @@ def scaled_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
         (n_cells,) values in [-1, 1]: 1 for a box or a regular simplex, 0 or less where inverted.
     """
     cell = cell_type_of(cells, points.shape[1])
-    if (groups := shapes_in(cells, cell.dim)) is not None:
+    if groups := shapes_in(cells, cell.dim):
         values = np.empty(len(cells))
         for name, mine in groups.items():
             own = cells[mine][:, collapse(name, cell.order).places]

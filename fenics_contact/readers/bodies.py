@@ -56,10 +56,10 @@ class TaggedMesh:
 
 @dataclass(frozen=True)
 class BodyParts:
-    """The groups of a body; without `regions` it has none."""
+    """The groups of a body, and the regions that they are, if any."""
 
     labels: tuple[Label, ...]
-    regions: tuple[str, ...] | None
+    regions: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,35 +79,21 @@ def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
     It is None for every group; a list of labels; or name of the body to a label, to a list of labels, or to a
     mapping from the name of a region to a label.
     """
-    if bodies is None:
-        bodies = list(mesh.groups)
-    if isinstance(bodies, (str, int)):
-        bodies = [bodies]
-    if not isinstance(bodies, Mapping):
-        bodies = {str(label): label for label in bodies}
     chosen = {}
-    for name, wanted in bodies.items():
+    for name, wanted in by_name(list(mesh.groups) if bodies is None else bodies).items():
         parts = _parts(wanted)
         labels = _known(parts.labels, mesh.groups, f"body '{name}'", mesh.words[0], mesh.source)
         chosen[name] = BodyParts(labels, parts.regions)
     if not chosen:
-        raise InvalidInputError(
-            f"{mesh.source} must have a {mesh.words[0]} for a body, there is none: name what the bodies are"
-        )
+        raise InvalidInputError(f"{mesh.source} has no {mesh.words[0]} for a body: name what the bodies are")
     return chosen
 
 
 def chosen_surfaces(mesh: TaggedMesh, surfaces: Any) -> dict[str, SurfaceParts]:
     """Resolve the caller's choice of surfaces, in the same forms but without regions."""
     known = {**mesh.node_sets, **mesh.facets}
-    if surfaces is None:
-        surfaces = list(known)
-    if isinstance(surfaces, (str, int)):
-        surfaces = [surfaces]
-    if not isinstance(surfaces, Mapping):
-        surfaces = {str(label): label for label in surfaces}
     chosen = {}
-    for name, wanted in surfaces.items():
+    for name, wanted in by_name(list(known) if surfaces is None else surfaces).items():
         labels = _known(_parts(wanted).labels, known, f"surface '{name}'", mesh.words[1], mesh.source)
         chosen[name] = SurfaceParts(
             [block for label in labels for block in mesh.facets.get(label, ())],
@@ -116,12 +102,20 @@ def chosen_surfaces(mesh: TaggedMesh, surfaces: Any) -> dict[str, SurfaceParts]:
     return chosen
 
 
+def listed(labels: Any) -> list[Any]:
+    """Return labels, of which one alone need not be in a list."""
+    return [labels] if isinstance(labels, (str, int, np.integer)) else list(labels)
+
+
+def by_name(wanted: Any) -> Mapping[str, Any]:
+    """Return what is wanted by its name, which for labels alone is their text."""
+    return wanted if isinstance(wanted, Mapping) else {str(label): label for label in listed(wanted)}
+
+
 def _parts(wanted: Any) -> BodyParts:
-    if isinstance(wanted, Mapping):
-        return BodyParts(tuple(wanted.values()), tuple(map(str, wanted)))
-    if isinstance(wanted, (str, int, np.integer)):
-        return BodyParts((wanted,), None)  # type: ignore[arg-type]
-    return BodyParts(tuple(wanted), tuple(map(str, wanted)))
+    names = by_name(wanted)
+    alone = listed(wanted) == [wanted]  # one label, whose group is not a region
+    return BodyParts(tuple(names.values()), () if alone else tuple(map(str, names)))
 
 
 def _known(
@@ -132,9 +126,7 @@ def _known(
     for label in labels:
         if not isinstance(label, Hashable) or str(label) not in by_text:
             there = ", ".join(map(repr, known)) or "none at all"
-            raise InvalidInputError(
-                f"{what} needs the {word} {label!r}, which {source} does not have: it has {there}"
-            )
+            raise InvalidInputError(f"{what} needs the {word} {label!r}, {source} has {there}")
     return tuple(by_text[str(label)] for label in labels)
 
 
@@ -162,9 +154,8 @@ def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dic
             if np.any(taken >= 0):
                 other = list(chosen)[int(taken.max())]
                 raise InvalidInputError(
-                    f"a cell must belong to one body, {np.count_nonzero(taken >= 0)} cells of {mesh.source} "
-                    f"belong to '{other}' and '{name}': say which {mesh.words[0]}s are bodies with "
-                    "bodies={name: label}"
+                    f"a cell must belong to one body, {np.count_nonzero(taken >= 0)} of {mesh.source} are of "
+                    f"'{other}' and '{name}': say which {mesh.words[0]}s are bodies by bodies={{name: label}}"
                 )
             owner[kind][numbers] = number
         cells = {kind: mesh.cells[kind][numbers] for kind, numbers, _ in found}
@@ -195,8 +186,7 @@ def _checked_order(mesh: TaggedMesh, name: str, cells: Mapping[str, np.ndarray])
     orders = {rows.shape[1] > shape_of(rows.shape[1], mesh.dim).corners for rows in cells.values()}
     if len(orders) > 1:
         raise InvalidInputError(
-            f"a body must have linear or quadratic cells, body '{name}' of {mesh.source} has both, of types "
-            f"{sorted(cells)}: mesh it with one order, or make bodies of its parts"
+            f"body '{name}' of {mesh.source} has both linear and quadratic cells: mesh it with one"
         )
 
 
@@ -216,9 +206,7 @@ def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> list[tuple[str, 
     ]
     chosen = [(kind, cells, n) for kind, cells, n in chosen if cells.size]
     if not chosen:
-        raise InvalidInputError(
-            f"a body must have cells, body '{name}' of {mesh.source} has none: mesh it, or leave it out"
-        )
+        raise InvalidInputError(f"body '{name}' of {mesh.source} has no cells: mesh it, or leave it out")
     kinds = sorted({kind for kind, _, _ in chosen})
     return [_cells_of_kind(mesh, name, parts, kind, chosen) for kind in kinds]
 
@@ -235,8 +223,7 @@ def _cells_of_kind(
     if double.size:
         pair = [parts.labels[region[double[0] + i]] for i in (0, 1)]
         raise InvalidInputError(
-            f"a cell must belong to one region, {double.size} cells of body '{name}' of {mesh.source} belong "
-            f"to {pair[0]!r} and {pair[1]!r}: leave one of them out"
+            f"{double.size} cells of body '{name}' of {mesh.source} belong to {pair[0]!r} and {pair[1]!r}"
         )
     return kind, cells, region
 
@@ -245,7 +232,7 @@ def _body(
     mesh: TaggedMesh,
     name: str,
     cells: np.ndarray,
-    regions: Sequence[str] | None,
+    regions: Sequence[str],
     region: np.ndarray,
     facets: Facets,
 ) -> BodyMesh:
@@ -271,7 +258,7 @@ def _body(
             members.append(np.flatnonzero(np.isin(nodes[corners], inside).all(axis=1)))
         if (there := np.unique(np.concatenate(members))).size:
             surfaces[surface] = boundary[there]
-    named = {} if regions is None else {label: np.flatnonzero(region == n) for n, label in enumerate(regions)}
+    named = {label: np.flatnonzero(region == n) for n, label in enumerate(regions)}
     held = {label: number[inside][number[inside] >= 0] for label, inside in mesh.point_sets.items()}
     held = {label: inside for label, inside in held.items() if len(inside) and label not in surfaces}
     try:
@@ -296,9 +283,8 @@ def _check_none_inside(
     )
     if inside:
         raise InvalidInputError(
-            f"a surface must lie on the boundary of a body, {inside} facets of '{surface}' of {mesh.source} "
-            f"lie inside body '{name}': make bodies of the parts on its two sides, or leave the surface out "
-            "with surfaces=[...]"
+            f"{inside} facets of '{surface}' of {mesh.source} lie inside body '{name}': make bodies of both "
+            "sides, or leave the surface out with surfaces=[...]"
         )
 
 
@@ -308,9 +294,7 @@ def _check_nodes_make_facets(mesh: TaggedMesh, facets: Facets, bodies: Mapping[s
         if parts.nodes and not any(name in body.surfaces for body in bodies.values()):
             count = sum(len(nodes) for nodes in parts.nodes)
             raise InvalidInputError(
-                f"a set of nodes must hold all corners of some facets to be a surface, the {count} nodes of "
-                f"'{name}' of {mesh.source} hold those of none on the bodies {list(bodies)}: save the "
-                "facets, or all their nodes"
+                f"{count} nodes of '{name}' of {mesh.source} hold no whole facet: save facets, or all nodes"
             )
 
 
@@ -332,5 +316,18 @@ def _check_facets_belong(mesh: TaggedMesh, surfaces: Facets) -> None:
                 raise InvalidInputError(
                     f"a surface must consist of faces of cells, {np.count_nonzero(off)} of {len(block)} "
                     f"facets of '{name}' of {mesh.source} are none, first at ({place}): mesh bodies and "
-                    "surfaces together, or leave the surface out with surfaces=[...]"
+                    "surfaces together"
                 )
+
+
+def other_cells(
+    source: str, kind: str, known: str = "tetrahedra, pyramids, prisms or hexahedra"
+) -> InvalidInputError:
+    """Return an error about cells of a type that cannot be read."""
+    plane = "(in the plane triangles or quadrilaterals)"
+    return InvalidInputError(f"cells must be {known} {plane}, {source} has {kind!r}: mesh it without these")
+
+
+def labelled(word: str, source: str) -> str:
+    """Say what cells need to be read."""
+    return f"every cell of {source} must have a {word}, which says what body it is"

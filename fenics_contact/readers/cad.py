@@ -25,7 +25,7 @@ from fenics_contact._base.progress import Task
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.readers.bodies import Label
+from fenics_contact.readers.bodies import Label, by_name, listed
 from fenics_contact.readers.cad_shapes import shape_seen
 from fenics_contact.readers.gmsh import Bodies, from_gmsh_model
 from fenics_contact.readers.gmsh_session import import_gmsh, lasting_session, physical_groups, reading_process
@@ -142,6 +142,11 @@ class InBox:
         below = face.upper <= np.array(self.upper) + face.near
         return bool((above & below).all())
 
+    @property
+    def in_words(self) -> str:
+        """Where the faces are."""
+        return f"wholly in the box from {self.lower} to {self.upper}"
+
 
 @displayed
 @dataclass(frozen=True)
@@ -169,6 +174,11 @@ class OnPlane:
         normal, point = np.array(self.normal)[: shape.dim], np.array([self.point])[:, : shape.dim]
         aside = np.linalg.norm(normal - (normal @ shape.normal) * np.array(shape.normal))
         return bool(aside < _PARALLEL and abs(shape.distance(point)[0]) < face.near)
+
+    @property
+    def in_words(self) -> str:
+        """Where the faces are."""
+        return f"on the plane through {self.point} with the normal {self.normal}"
 
 
 @displayed
@@ -209,6 +219,12 @@ class OnCylinder:
             and np.linalg.norm(np.cross(away, axis)) < face.near
         )
 
+    @property
+    def in_words(self) -> str:
+        """Where the faces are."""
+        axis = [f" {word} {at}" for word, at in (("along", self.axis), ("through", self.point)) if at]
+        return f"on a cylinder of radius {self.radius:g}{' about the axis' * bool(axis)}{''.join(axis)}"
+
 
 Chosen: TypeAlias = Label | InBox | OnPlane | OnCylinder | Callable[[CadFace], bool]
 """Name or number of a face or of a group of the file, or what says of a face whether it is chosen."""
@@ -220,21 +236,16 @@ def chosen_faces(
     faces: Sequence[CadFace], groups: Mapping[Label, Sequence[int]], surfaces: Any, source: str
 ) -> dict[str, list[int]]:
     """Resolve the caller's choice of surfaces."""
-    if isinstance(surfaces, str | int):
-        surfaces = [surfaces]
-    if not isinstance(surfaces, Mapping):
-        surfaces = {str(label): label for label in surfaces}
     known = {str(face.number): [face.number] for face in faces} | {str(k): list(v) for k, v in groups.items()}
     found: dict[str, list[int]] = {}
     owner: dict[int, str] = {}
-    for name, wanted in surfaces.items():
-        several = [wanted] if isinstance(wanted, str | int) or callable(wanted) else wanted
+    for name, wanted in by_name(surfaces).items():
+        several = [wanted] if callable(wanted) else listed(wanted)
         found[name] = sorted({n for each in several for n in _found(each, name, faces, known, source)})
         for number in found[name]:
             if (other := owner.setdefault(number, name)) != name:
                 raise InvalidInputError(
-                    f"a face must belong to one surface, face {number} of {source} is chosen for {other!r} "
-                    f"and for {name!r}: choose less for one of them. {_listed(faces)}"
+                    f"face {number} of {source} cannot be of {other!r} and {name!r}: {_listed(faces)}"
                 )
     return found
 
@@ -251,17 +262,9 @@ def _found(
 
 
 def _in_words(wanted: Chosen) -> str:
-    if isinstance(wanted, InBox):
-        return f"wholly in the box from {wanted.lower} to {wanted.upper}"
-    if isinstance(wanted, OnPlane):
-        return f"on the plane through {wanted.point} with the normal {wanted.normal}"
-    if isinstance(wanted, OnCylinder):
-        where = [] if wanted.axis is None else [f" along {wanted.axis}"]
-        where += [] if wanted.point is None else [f" through {wanted.point}"]
-        return f"on a cylinder of radius {wanted.radius:g}" + (
-            f" about the axis{''.join(where)}" * bool(where)
-        )
-    return "chosen by its function" if callable(wanted) else f"called {wanted!r}"
+    if callable(wanted):
+        return str(getattr(wanted, "in_words", "chosen by its function"))
+    return f"called {wanted!r}"
 
 
 def _listed(faces: Sequence[CadFace], most: int = 60) -> str:
@@ -337,16 +340,13 @@ def _read(
     require_file(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InvalidInputError(
-            f"file '{path}' must be a CAD file, {', '.join(SUFFIXES)}: read a mesh with `read_msh` or "
-            "`read_mesh`"
+            f"file '{path}' must be a CAD file, {', '.join(SUFFIXES)}: read a mesh with `read_msh`"
         )
     for name, given in {"": size, **sizes}.items():
         of = f" of {name!r}" if name else ""
         check_numbers(**{f"size{of}": 1.0 if given is None and not name else given})
         if given is not None and given <= 0:
-            raise InvalidInputError(
-                f"size{of} must be above zero, got {given}: give the largest edge of a cell"
-            )
+            raise InvalidInputError(f"size{of} must be above zero, got {given}: give the largest edge")
     if order not in (1, 2):
         raise InvalidInputError(f"order must be 1 or 2, got {order}: linear or quadratic cells")
     options: dict[str, float] = {
@@ -410,11 +410,9 @@ def _require_joined(gmsh: ModuleType, dim: int, bodies: Bodies | None, path: Pat
                 other, first = found.setdefault(floats(np.round(box / np.ptp(box), 4) + 0.0), (face, label))
                 if other != face and first != label:
                     raise InvalidInputError(
-                        f"solids of a body must hang together, but {first!r} and {label!r} of body {name!r} "
-                        f"meet in a face that file '{path}' has twice, as {other} and {face}: join them by a "
-                        f'file join.geo with SetFactory("OpenCASCADE"); v() = ShapeFromFile("{path.name}"); '
-                        "Coherence; and read that, or let each be a body and give the scene a Tie between "
-                        "these faces"
+                        f"{first!r} and {label!r} of body {name!r} meet in a face that file '{path}' has "
+                        'twice: write a file join.geo with SetFactory("OpenCASCADE"); v() = '
+                        f'ShapeFromFile("{path.name}"); Coherence; and read that, or make bodies and a Tie'
                     )
 
 
@@ -440,8 +438,7 @@ def _labels_of(bodies: Bodies | None) -> dict[str, list[str]]:
     """Return the labels of the parts of each body that is chosen."""
     found = {}
     for body, parts in (bodies if isinstance(bodies, Mapping) else {}).items():
-        inside = parts.values() if isinstance(parts, Mapping) else parts
-        found[body] = [str(label) for label in ([inside] if isinstance(inside, str | int) else inside)]
+        found[body] = [str(label) for label in by_name(parts).values()]
     return found
 
 
@@ -461,8 +458,7 @@ def _set_sizes(
         known[body] = [entity for label in labels for entity in known.get(label, [])]
     if missing := [name for name in sizes if not known.get(name)]:
         raise InvalidInputError(
-            f"a size must be of a body or a surface of {source}, which has {', '.join(map(repr, known))}; "
-            f"got {missing[0]!r}: correct the name"
+            f"sizes are of bodies and surfaces of {source}, {', '.join(map(repr, known))}, got {missing[0]!r}"
         )
     if size is not None and max(sizes.values()) > size:  # it is no limit for all any more
         gmsh.model.mesh.setSize(gmsh.model.getEntities(0), size)
@@ -478,8 +474,7 @@ def _reasons(path: Path) -> Iterator[None]:
         yield
     except Exception as reason:  # gmsh raises no other class
         raise InvalidInputError(
-            f"file '{path}' must be one that gmsh can read and mesh, it says: {reason}: look at it with "
-            "gmsh, or give another size"
+            f"file '{path}' must be one that gmsh can read and mesh, it says: {reason}: open it in gmsh"
         ) from reason
 
 

@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import corners_of, vector_areas
-from fenics_contact.readers.gmsh_session import physical_groups, running_gmsh
+from fenics_contact.readers.bodies import listed
+from fenics_contact.readers.gmsh_session import initialised_gmsh, physical_groups
 from fenics_contact.shapes.combined import CLOSE, Joined, recognised
 from fenics_contact.shapes.parametric import SplinePatch, tensor_grid
 from fenics_contact.shapes.simple import SurfaceShape
@@ -121,22 +122,16 @@ def cad_shapes(
     physical groups (by name, or number), or named entities, of which it consists; all with the name of such a
     group unless given.
     """
-    gmsh = running_gmsh()
-    if gmsh is None:
-        raise InvalidInputError(
-            "cad_shapes needs a model in memory, gmsh is not initialised: call gmsh.initialize(), build and "
-            "mesh a model first, or read it with `read_cad`"
-        )
+    gmsh = initialised_gmsh("cad_shapes", "read_cad")
     known, nodes = _named(gmsh, mesh.dim - 1), _nodes(gmsh)
     chosen = {name: name for name in mesh.surfaces if name in known} if surfaces is None else surfaces
     shapes = {}
     for name, labels in chosen.items():
         if name not in mesh.surfaces:
             raise InvalidInputError(
-                f"cad_shapes names surface {name!r}, the body has {sorted(mesh.surfaces)}: use one of them"
+                f"cad_shapes names surface {name!r}, the body has {sorted(mesh.surfaces)}"
             )
-        several = [labels] if isinstance(labels, str | int) else labels
-        tags = sorted({tag for label in several for tag in _tags(known, str(label), name)})
+        tags = sorted({tag for label in listed(labels) for tag in _tags(known, str(label), name)})
         shape = _shape(gmsh, tags, nodes, mesh, mesh.surfaces[name])
         if shape is None:
             _LOGGER.info("surface %r stays as its facets are: it has no geometry, or has left it", name)
@@ -157,10 +152,7 @@ def _named(gmsh: ModuleType, dim: int) -> dict[str, list[int]]:
 def _tags(known: Mapping[str, list[int]], label: str, surface: str) -> list[int]:
     if label not in known:
         there = ", ".join(map(repr, sorted(known))) or "none at all"
-        raise InvalidInputError(
-            f"the shape of surface {surface!r} needs the physical group {label!r}, which gmsh's model does "
-            f"not have: it has {there}"
-        )
+        raise InvalidInputError(f"surface {surface!r} needs physical group {label!r}, the model has {there}")
     return known[label]
 
 

@@ -55,9 +55,7 @@ class _Instance:
             axis = np.array(given[3:6]) - given[:3] if len(given) == 7 else np.zeros(3)
             if not axis.any():
                 raise card.error(
-                    "a rotation needs two points and an angle, seven numbers, got "
-                    f"{card.lines[1].strip()!r}: complete them",
-                    1,
+                    f"needs two points and an angle, got {card.lines[1].strip()!r}: correct it", 1
                 )
             about, turn = np.array(given[:3]), _rotation(axis, np.radians(given[6]))
         return cls(card, card.required("NAME"), card.required("PART"), [], shift, turn, about)
@@ -76,8 +74,7 @@ class _Instance:
             fits &= not self.shift[0] and bool(np.allclose(self.turn, np.eye(3), rtol=0.0, atol=1e-12))
         if not fits:
             raise self.card.error(
-                f"{element.name_of('TYPE')} of part {self.part!r} must stay in its plane, or on its axis: "
-                "move it within"
+                f"{element.name_of('TYPE')} of part {self.part!r} must stay in its plane, or on its axis"
             )
 
 

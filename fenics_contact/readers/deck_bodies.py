@@ -53,10 +53,8 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
     lost = np.flatnonzero(of_element < 0)
     if len(lost):
         block = mesh.blocks[mesh.block_of[lost[0]]]
-        raise block.card.error(
-            f"element {block.card.label(mesh.element_numbers[lost[0]])} and {len(lost) - 1} others have no "
-            "*SOLID SECTION: add it"
-        )
+        first = block.card.label(mesh.element_numbers[lost[0]])
+        raise block.card.error(f"element {first} and {len(lost) - 1} others have no *SOLID SECTION: add it")
     return sections, of_element
 
 
@@ -234,8 +232,7 @@ def build_bodies(
     if len(dims) > 1:
         block = next(b for b in mesh.blocks if b.element.kind != mesh.blocks[0].element.kind)
         raise block.card.error(
-            f"elements must be of one kind, got {mesh.blocks[0].element.name} and {block.element.name}: "
-            "make two decks"
+            f"elements must be of one kind, got {mesh.blocks[0].element.name} and {block.element.name}"
         )
     dim = mesh.blocks[0].element.dim
     points = np.ascontiguousarray(mesh.points[:, :dim])
@@ -384,9 +381,7 @@ def integration_of(
     found = {each.element.variant == "R" and each.element.cell in _REDUCED for each in blocks}
     if len(found) > 1:
         block = next(each for each in blocks if each.element.variant == "R")
-        raise block.card.error(
-            f"body {part.name} has elements of full and of reduced integration: take one type of elements"
-        )
+        raise block.card.error(f"body {part.name} has elements of full and of reduced integration: take one")
     return "reduced" if found.pop() else "full"
 
 

@@ -181,10 +181,9 @@ class Card:
         """Return numbers, one of each data line or those of one, as whole ones, (n,)."""
         wrong = np.flatnonzero((values != np.round(values)) | (np.abs(values) > MOST_NUMBERS))
         if len(wrong):
-            raise self.error(
-                f"numbers must be whole and at most {MOST_NUMBERS}, got {values[wrong[0]]:g}: correct it",
-                int(wrong[0]) if row is None else row,
-            )
+            at = int(wrong[0]) if row is None else row
+            got = f"{values[wrong[0]]:g}"
+            raise self.error(f"numbers must be whole and at most {MOST_NUMBERS}, got {got}: correct it", at)
         return values.astype(np.int64)
 
     @cached_property
@@ -239,18 +238,25 @@ class Card:
         ends = np.cumsum([line.count(",") + 1 for line in text])
         if values is None:
             row = next(k for k, line in enumerate(text) if _numbers(line, np.int64) is None)
-            raise self.error(
-                f"must list whole numbers, got {self.lines[row].strip()!r}: correct the line", row
-            )
+            raise self.error(f"must list whole numbers, got {self.lines[row].strip()!r}: correct it", row)
         records = np.arange(width, ends[-1] + 1, width) if len(ends) else ends
         lost = np.flatnonzero(~np.isin(records, ends))
         if lost.size or (len(ends) and ends[-1] % width):
             start = records[lost[0]] - width if lost.size else ends[-1] // width * width
             row = int(np.searchsorted(ends, start, side="right"))
-            raise self.error(
-                f"needs {width} numbers for each element, this line has others: correct it, or TYPE=", row
-            )
+            raise self.error(f"needs {width} numbers for each element: correct this line, or TYPE=", row)
         return values.reshape(-1, width)
+
+
+class AtLine:
+    """What a data line of a card gives; errors about it are at that line."""
+
+    card: Card
+    row: int
+
+    def error(self, words: str) -> DeckError:
+        """Return an error at the line."""
+        return self.card.error(words, self.row)
 
 
 def plain(text: str) -> str:
@@ -302,6 +308,10 @@ class _Stretch:
     lines: Sequence[str]
     numbers: Sequence[int]
 
+    def error(self, words: str) -> DeckError:
+        """Return an error at its first line."""
+        return DeckError(words, self.file, self.numbers[0])
+
 
 def cards_of(path: Path) -> list[Card]:
     """Return the cards of a deck; the text of a file that it includes is in the place of *INCLUDE."""
@@ -312,10 +322,7 @@ def cards_of(path: Path) -> list[Card]:
         elif stretch.lines and parts:
             parts[-1].append(stretch)
         elif stretch.lines:
-            raise DeckError(
-                f"data must follow a card, got {stretch.lines[0].strip()[:40]!r}",
-                stretch.file, stretch.numbers[0],
-            )  # fmt: skip
+            raise stretch.error(f"data must follow a card, got {stretch.lines[0].strip()[:40]!r}")
     return [_card(stretches) for stretches in parts]
 
 
@@ -323,10 +330,7 @@ def _stretches(path: Path, folder: Path, inside: tuple[Path, ...]) -> Iterator[_
     lines = [line.lstrip() for line in path.read_text("utf-8-sig", errors="replace").splitlines()]
     heads = [k for k, line in enumerate(lines) if line[:1] == "*" and line[:2] != "**"]
     if not heads and not inside:
-        raise DeckError(
-            "a deck must have cards such as *NODE, this file has none: give one of CalculiX or Abaqus",
-            path.name,
-        )
+        raise DeckError("a deck must have cards such as *NODE, got a file without", path.name)
     yield _stretch("", lines, -1, 0, heads[0] if heads else len(lines), path.name)
     for head, end in zip(heads, [*heads, len(lines)][1:], strict=True):
         keyword, start = _keyword(lines, head, end)
@@ -347,11 +351,7 @@ def _stretch(keyword: str, lines: Sequence[str], head: int, start: int, end: int
 def _without_keyword(stretch: _Stretch) -> _Stretch:
     """Take an asterisk alone for a comment, which data cannot follow."""
     if stretch.lines:
-        raise DeckError(
-            "data cannot follow an asterisk alone: name a card, or write ** for a comment",
-            stretch.file,
-            stretch.numbers[0],
-        )
+        raise stretch.error("data cannot follow an asterisk alone: name a card, or write ** for a comment")
     return replace(stretch, keyword="")
 
 

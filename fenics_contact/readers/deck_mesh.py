@@ -164,16 +164,10 @@ class DeckMesh:
         for number in np.unique(block_of[elements]):
             element = self.blocks[number].element
             if not 0 <= side < len(element.faces):
-                raise card.error(
-                    f"{element.name} has faces {label[:1]}1 to {label[:1]}{len(element.faces)}, got "
-                    f"{label!r}: correct the label",
-                    row,
-                )
+                raise card.error(f"{element.name} has {len(element.faces)} faces, got {label!r}", row)
             if not element.faces[side]:
                 first = card.label(self.element_numbers[elements[block_of[elements] == number][0]])
-                raise card.error(
-                    f"face {label!r} of element {first} is no more than an edge: leave it out", row
-                )
+                raise card.error(f"face {label!r} of element {first} is only an edge: leave it out", row)
         return Faces(elements, np.full(len(elements), side))
 
 
@@ -287,10 +281,7 @@ def _generated(mesh: DeckMesh, card: Card, what: str, known: np.ndarray) -> np.n
         by = int(step[0]) if step and step[0] else 1
         if last < first or by < 1:
             raise card.error(
-                f"GENERATE needs first ≤ last and an increment above zero, got {card.lines[row].strip()!r}: "
-                "correct "
-                "them",
-                row,
+                f"GENERATE needs first ≤ last and an increment > 0, got {card.lines[row].strip()!r}", row
             )
         wanted |= (known >= int(first)) & (known <= int(last)) & ((known - int(first)) % by == 0)
     return np.flatnonzero(wanted)
@@ -319,9 +310,7 @@ def _surface(mesh: DeckMesh, card: Card) -> Named:
         elements = mesh.elements_named(row[0], card, k)
         label = row[1].upper() if len(row) > 1 else ""
         if label[:1] != "S":
-            raise card.error(
-                f"needs a face S1, S2, ... behind the elements, got {label or 'nothing'!r}: add it", k
-            )
+            raise card.error(f"needs a face S1, S2, ... behind the elements, got {label or 'nothing'!r}", k)
         parts.append(mesh.faces_of(elements, label, card, k))
     return Named(card, joined(parts), NO_NODES)
 

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from fenics_contact._base.checks import naming_arguments, require_file
+from fenics_contact._base.checks import check_each, naming_arguments, require_file
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import start
 from fenics_contact.errors import InvalidInputError, together
@@ -22,7 +22,7 @@ from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, OF_THE_FILE
 from fenics_contact.mesh.plane import flattened, turned_right_handed
-from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, cells_of_bodies
+from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, cells_of_bodies, labelled, other_cells
 
 if TYPE_CHECKING:
     import dolfinx
@@ -119,15 +119,11 @@ class DolfinxBodies(Mapping[str, BodyMesh]):
 
         given = np.asarray(space.mesh.geometry.input_global_indices)
         if not np.array_equal(self.arrays.inputs[self.arrays.node], given):
-            raise InvalidInputError(
-                "function_on needs a space on the mesh that the bodies were made of, this one is on another: "
-                "give a space on that mesh"
-            )
+            raise InvalidInputError("function_on needs a space on the mesh that the bodies were made of")
         degree, order = _dolfinx.lagrange_degree(space), self.arrays.order
         if degree is None or 0 < degree < order:
             raise InvalidInputError(
-                f"function_on needs a space of Lagrange elements, of degree {order} or higher like the mesh, "
-                f"or of degree 0 for values on cells, got {space.ufl_element()}: give another space"
+                f"space must be Lagrange of degree {order} or higher, or degree 0, got {space.ufl_element()}"
             )
         return degree
 
@@ -136,18 +132,16 @@ class DolfinxBodies(Mapping[str, BodyMesh]):
     ) -> dict[str, np.ndarray]:
         """Return the values of each body as rows of the space's components."""
         size, result = int(space.dofmap.index_map_bs), {}
-        what, numbers = ("cells", self.cells) if degree == 0 else ("nodes", self.nodes)
+        numbers = self.cells if degree == 0 else self.nodes
         for body, given in values.items():
             if body not in self.bodies:
-                raise InvalidInputError(
-                    f"function_on knows the bodies {list(self.bodies)}, got {body!r}: use these"
-                )
+                raise InvalidInputError(f"function_on knows the bodies {list(self.bodies)}, got {body!r}")
             rows = np.asarray(given, dtype=np.float64)
             rows = rows.reshape(len(rows), -1)
             if rows.shape != (len(numbers[body]), size):
                 raise InvalidInputError(
-                    f"values of body {body!r} must have shape ({len(numbers[body])}, {size}), its {what} and "
-                    f"the components of the space, got {np.shape(given)}: give another space or other values"
+                    f"values of {body!r} must have shape ({len(numbers[body])}, {size}), got "
+                    f"{np.shape(given)}"
                 )
             result[body] = rows
         if degree > 0:
@@ -163,8 +157,7 @@ class DolfinxBodies(Mapping[str, BodyMesh]):
         apart = np.abs(np.diff(rows[order], axis=0)).max(axis=1, initial=0.0)[same].max(initial=0.0)
         if apart > 1e-6 * np.abs(rows).max(initial=0.0):
             raise InvalidInputError(
-                f"bodies that share nodes of the mesh must have the same values there, {list(values)} differ "
-                f"by up to {apart:.3g}: bring them back one at a time, or mesh them with nodes of their own"
+                f"{list(values)} share nodes, but differ by up to {apart:.3g}: bring them back one by one"
             )
 
 
@@ -175,6 +168,7 @@ _FACETS = {
     "quadrilateral": ("polyline", "edge"),
 }
 """XDMF's names of the facets of each shape of cells."""
+_KNOWN = "tetrahedra or hexahedra"
 _QUADRATIC = {"tetrahedron_10", "hexahedron_27", "triangle_6", "quadrilateral_9", "edge_3"}
 """XDMF's names of quadratic cells and facets."""
 
@@ -219,8 +213,7 @@ def grids_of(path: Path) -> list[Grid]:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as reason:
         raise InvalidInputError(
-            f"file '{path}' must be an XDMF file, it is no XML ({reason}): give the .xdmf file, not "
-            f"the .h5 file"
+            f"file '{path}' must be an XDMF file, it is no XML ({reason}): give the .xdmf, not the .h5 file"
         ) from reason
     grids = []
     for node in root.findall("Domain/Grid"):
@@ -247,18 +240,14 @@ def _grid(node: ElementTree.Element, topology: ElementTree.Element) -> Grid:
 def _check_topology(grid: Grid, path: Path) -> None:
     if grid.topology == "mixed":
         raise InvalidInputError(
-            f"a body must have cells of one type, grid '{grid.name}' of file '{path}' is mixed: write cells "
-            "and facets to files of their own (facet_file=...), and cells of one type only"
+            f"grid '{grid.name}' of file '{path}' is mixed: write cells and facets apart (facet_file=...)"
         )
     if "_" in grid.topology and grid.topology not in _QUADRATIC:  # Hexahedron_20, Hexahedron_64
         raise InvalidInputError(
             f"grid '{grid.name}' of file '{path}' is of type '{grid.topology}': {OF_THE_FILE}"
         )
     if grid.topology in ("wedge", "pyramid"):
-        raise InvalidInputError(
-            f"cells must be tetrahedra or hexahedra, grid '{grid.name}' of file '{path}' is of type "
-            f"'{grid.topology}': mesh it without prisms and pyramids"
-        )
+        raise other_cells(f"grid '{grid.name}' of file '{path}'", grid.topology, _KNOWN)
 
 
 def chosen_grid(
@@ -282,8 +271,7 @@ def chosen_grid(
         )
     if not optional:
         raise InvalidInputError(
-            f"file '{path}' must have a mesh of tetrahedra, hexahedra, triangles or quadrilaterals: "
-            f"it has {there}"
+            f"file '{path}' must have tetrahedra, hexahedra, triangles or quadrilaterals, it has {there}"
         )
     return None
 
@@ -407,8 +395,7 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
         return _tagged_mesh(mesh, arrays, tags(path, cells), tags(facet_path, facets), source)
     except RuntimeError as reason:  # dolfinx raises no other class
         raise InvalidInputError(
-            f"file '{path}' must be an XDMF file that dolfinx can read, with its HDF5 file beside it, "
-            f"dolfinx says: {reason}: write it again"
+            f"file '{path}' must be XDMF with its HDF5 file beside it, dolfinx says: {reason}: write it again"
         ) from reason
 
 
@@ -422,14 +409,9 @@ def _tagged_mesh(
     from fenics_contact import _dolfinx
 
     if arrays.order > 2:
-        raise InvalidInputError(
-            f"{source} has cells of type '{arrays.cell_type}' of order {arrays.order}: {OF_THE_FILE}"
-        )
+        raise InvalidInputError(f"{source} has {arrays.cell_type} of order {arrays.order}: {OF_THE_FILE}")
     if arrays.cell_type not in CELL_TYPES:
-        raise InvalidInputError(
-            "cells must be tetrahedra or hexahedra (in two dimensions triangles or quadrilaterals), "
-            f"{source} has cells of type '{arrays.cell_type}': mesh it with others"
-        )
+        raise other_cells(source, arrays.cell_type, _KNOWN)
     points = arrays.points
     if arrays.dim == 2:
         points = flattened(points, np.unique(arrays.cells), source)
@@ -449,12 +431,8 @@ def _groups(arrays: MeshArrays, tagged: TagArrays | None, source: str) -> dict[L
     n_cells = arrays.cells.shape[0]
     if tagged is None:
         return {"mesh": {arrays.cell_type: np.arange(n_cells)}}
-    left = np.setdiff1d(np.arange(n_cells), tagged.entities)
-    if left.size:
-        raise InvalidInputError(
-            f"every cell must have a tag, which says what body it is, {left.size} of {n_cells} cells of "
-            f"{source} have none, first cell {left[0]}: give the rest a tag of its own"
-        )
+    fits = np.isin(np.arange(n_cells), tagged.entities)
+    check_each(fits, labelled("tag", source), "give the rest a tag of its own", "cell {}".format)
     return {
         int(tag): {arrays.cell_type: np.sort(tagged.entities[tagged.values == tag])}
         for tag in np.unique(tagged.values)

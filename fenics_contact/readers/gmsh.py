@@ -24,9 +24,9 @@ from fenics_contact.readers.bodies import TaggedMesh, bodies_of
 from fenics_contact.readers.cad_shapes import cad_shapes
 from fenics_contact.readers.gmsh_session import (
     gmsh_model,
+    initialised_gmsh,
     lasting_session,
     reading_process,
-    running_gmsh,
     tagged_mesh_of,
 )
 
@@ -101,12 +101,7 @@ def from_gmsh_model(
         InvalidInputError: As `read_msh`, or if gmsh is not initialised.
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
     """
-    gmsh = running_gmsh()
-    if gmsh is None:
-        raise InvalidInputError(
-            "from_gmsh_model needs a model in memory, gmsh is not initialised: call gmsh.initialize(), build "
-            "and mesh a model first, or read a file with `read_msh`"
-        )
+    gmsh = initialised_gmsh("from_gmsh_model", "read_msh")
     made = bodies_of(tagged_mesh_of(gmsh, f"model '{gmsh.model.getCurrent()}'"), bodies, surfaces)
     if not shapes:
         return made
@@ -162,24 +157,22 @@ def refilled(mesh: BodyMesh) -> BodyMesh:
     """
     if mesh.cell_type != "tetrahedron" or mesh.regions or mesh.shapes:
         raise InvalidInputError(
-            "a body is refilled with linear tetrahedra and has neither regions nor true shapes of surfaces, "
-            f"got {mesh.cells_in_words}, regions {sorted(mesh.regions)} and shapes of {sorted(mesh.shapes)}: "
-            "keep its cells, as Remeshed does by default, or mesh it by a function of your own"
+            "a body is refilled with linear tetrahedra and has neither regions nor true shapes, got "
+            f"{mesh.cells_in_words}, regions {sorted(mesh.regions)}, shapes of {sorted(mesh.shapes)}: keep "
+            "its cells"
         )
     facets, _ = boundary_faces(mesh.cells)
     try:
         points, cells = _filled(mesh.points, facets)
     except Exception as error:
         raise FenicsContactError(
-            f"gmsh must fill the boundary of {mesh.cells_in_words} with tetrahedra, but failed ({error}): "
-            "check that no parts of the boundary penetrate each other"
+            f"gmsh must fill the boundary of {mesh.cells_in_words}, but failed ({error}): is it sound?"
         ) from error
     rounding = 1e-9 * float(np.ptp(mesh.points, axis=0).max())
     distance, number = cKDTree(points).query(mesh.points[facets])
     if distance.max() > rounding:
         raise FenicsContactError(
-            f"gmsh must keep the nodes of the boundary, got one that is off by {distance.max():.1e}: please "
-            "report this mesh and the version of gmsh"
+            f"gmsh must keep the nodes of the boundary, one is off by {distance.max():.1e}: please report it"
         )
     row = np.full(mesh.n_nodes, -1, dtype=np.int64)
     row[facets] = number
@@ -187,8 +180,7 @@ def refilled(mesh: BodyMesh) -> BodyMesh:
     inside = [name for name, nodes in mesh.node_sets.items() if (row[nodes] < 0).any()]
     if inside:
         raise InvalidInputError(
-            f"a body that is meshed anew keeps the nodes of its boundary alone, node set {inside[0]!r} has "
-            "others: leave it out"
+            f"a refilled body has nodes on its boundary alone, node set {inside[0]!r} has others: omit it"
         )
     surfaces, sets = (
         {name: row[nodes] for name, nodes in named.items()} for named in (mesh.surfaces, mesh.node_sets)

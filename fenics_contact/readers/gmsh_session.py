@@ -25,7 +25,7 @@ from fenics_contact.mesh.cell_types import OF_THE_FILE
 from fenics_contact.mesh.collapsed import SHAPES
 from fenics_contact.mesh.plane import flattened, turned_counter_clockwise
 from fenics_contact.mesh.quadratic_nodes import ordered
-from fenics_contact.readers.bodies import Label, TaggedMesh
+from fenics_contact.readers.bodies import Label, TaggedMesh, other_cells
 
 _TYPES = {
     2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron", 6: "prism", 7: "pyramid",
@@ -44,8 +44,7 @@ def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
     dim = 3 if elements[3] else 2
     if not elements[dim]:
         raise InvalidInputError(
-            f"{source} must hold cells, it has none: mesh it (gmsh.model.mesh.generate) and put its volumes, "
-            "or the surfaces of a plane body, into physical groups"
+            f"{source} must hold cells, it has none: mesh it, and put all bodies into physical groups"
         )
     groups = _groups(gmsh, dim, set(elements[dim]), source)
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
@@ -89,10 +88,7 @@ def _elements(gmsh: ModuleType, dim: int, source: str) -> dict[int, dict[str, np
             if order > 1 and number not in _TYPES:
                 raise InvalidInputError(f"{source} has cells of type '{name}': {OF_THE_FILE}")
             if number not in _TYPES:
-                raise InvalidInputError(
-                    "cells must be tetrahedra, pyramids, prisms or hexahedra (in two dimensions triangles or "
-                    f"quadrilaterals), {source} has cells of type '{name}': mesh it without these"
-                )
+                raise other_cells(source, name)
             blocks = elements.setdefault(int(entity), {})
             blocks[_TYPES[number]] = tags.astype(np.int64).reshape(-1, nodes_each)
     return elements
@@ -110,8 +106,7 @@ def _groups(gmsh: ModuleType, dim: int, meshed: set[int], source: str) -> dict[L
         word = "volume" if dim == 3 else "surface"
         raise InvalidInputError(
             f"every {word} with cells must be in a physical {word}, which says what body it is, {word}s "
-            f"{left} of {source} are in none: name them with gmsh.model.addPhysicalGroup({dim}, tags, "
-            f"name=...)"
+            f"{left} of {source} are in none: use gmsh.model.addPhysicalGroup({dim}, tags, name=...)"
         )
     return {label: tags for label, tags in groups.items() if meshed.intersection(tags)}
 
@@ -244,11 +239,14 @@ def gmsh_model(name: str, **more: float) -> Iterator[ModuleType]:
                 gmsh.finalize()
 
 
-def running_gmsh() -> ModuleType | None:
-    """Return the module ``gmsh`` if it is initialised, else None."""
+def initialised_gmsh(user: str, reader: str) -> ModuleType:
+    """Return the module ``gmsh``, which must have a model in memory."""
     with interrupt_handler_kept():
         gmsh = import_gmsh()
-        return gmsh if _is_initialised(gmsh) else None
+        if not _is_initialised(gmsh):
+            remedy = f"call gmsh.initialize(), build and mesh a model first, or read it with `{reader}`"
+            raise InvalidInputError(f"{user} needs a model in memory, gmsh is not initialised: {remedy}")
+        return gmsh
 
 
 def _initialise(gmsh: ModuleType) -> None:

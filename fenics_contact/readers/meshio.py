@@ -21,14 +21,14 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from fenics_contact._base.checks import naming_arguments, require_file
+from fenics_contact._base.checks import check_each, naming_arguments, require_file
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import shape_of
 from fenics_contact.mesh.plane import flattened, turned_right_handed
 from fenics_contact.mesh.quadratic_nodes import ordered
-from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of
+from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, labelled, other_cells
 from fenics_contact.readers.dolfinx import Bodies, Surfaces, read_xdmf
 from fenics_contact.readers.gmsh import read_msh
 
@@ -69,8 +69,7 @@ def _check_nodes(lines: Sequence[str], path: Path) -> None:
     count = sum(bool(_NODE.match(line)) for line in lines)
     if count > 1:
         raise InvalidInputError(
-            f"file '{path}' must list its nodes under one *NODE, it has {count}, of which meshio keeps the "
-            "last: write it without parts and assemblies, or save the mesh in another format"
+            f"file '{path}' must list nodes under one *NODE, it has {count}, of which meshio keeps the last"
         )
 
 
@@ -86,12 +85,18 @@ _SERENDIPITY_OR_LAGRANGE = {
 
 @dataclass(frozen=True)
 class Block:
-    """The role of a block of a meshio mesh; its cells of bodies have a kind, and numbers from `start`."""
+    """The role of a block of a meshio mesh; its cells of bodies have a kind, and numbers from `start`.
 
-    kind: str | None
+    A block has a kind, or facets, or neither.
+    """
+
+    kind: str
     start: int
-    facets: np.ndarray | None
+    facets: np.ndarray
     size: int
+
+
+_NO_FACETS = np.zeros((0, 0), dtype=np.int64)
 
 
 def cells_of(
@@ -100,10 +105,7 @@ def cells_of(
     """Sort the blocks of a mesh into cells and facets, and return the role of each block."""
     dim = max((block.dim for block in mesh.cells if len(block)), default=0)
     if dim < 2:
-        raise InvalidInputError(
-            f"{source} must hold cells, it has {_counted(mesh)}: save the tetrahedra or hexahedra of the "
-            "bodies, of plane ones the triangles or quadrilaterals"
-        )
+        raise InvalidInputError(f"{source} must hold cells, it has {_counted(mesh)}: save those of bodies")
     used = [_nodes(block, mesh, source, corners_only) for block in mesh.cells if block.dim == dim]
     points = np.array(mesh.points, dtype=np.float64)
     blocks_of: dict[int, list[np.ndarray]] = {}
@@ -132,10 +134,7 @@ def _nodes(block: meshio.CellBlock, mesh: meshio.Mesh, source: str, corners_only
     name = block.type
     linear = _SERENDIPITY_OR_LAGRANGE.get(name, name)
     if linear not in _CORNERS:
-        raise InvalidInputError(
-            "cells must be tetrahedra, pyramids, prisms or hexahedra (in two dimensions triangles or "
-            f"quadrilaterals), {source} has {_counted(mesh)}: mesh it without cells of type '{name}'"
-        )
+        raise other_cells(source, name)
     nodes = np.array(block.data, dtype=np.int64)
     return nodes[:, : _CORNERS[linear]] if corners_only else nodes
 
@@ -147,12 +146,12 @@ def _blocks(mesh: meshio.Mesh, dim: int, kinds: Mapping[int, str], corners_only:
         if block.dim == dim:
             corners = _CORNERS[_SERENDIPITY_OR_LAGRANGE.get(block.type, block.type)]
             kind = kinds[corners if corners_only else block.data.shape[1]]
-            blocks.append(Block(kind, count[kind], None, size))
+            blocks.append(Block(kind, count[kind], _NO_FACETS, size))
             count[kind] += size
             continue
         corners = 2 if dim == 2 else _CORNERS.get(_SERENDIPITY_OR_LAGRANGE.get(block.type, block.type), 0)
         usable = block.dim == dim - 1 and corners
-        blocks.append(Block(None, 0, np.array(block.data)[:, :corners] if usable else None, size))
+        blocks.append(Block("", 0, np.array(block.data)[:, :corners] if usable else _NO_FACETS, size))
     return blocks
 
 
@@ -213,9 +212,8 @@ def _sets(mesh: meshio.Mesh, blocks: Sequence[Block], source: str) -> dict[Label
         )
         if not fits:
             raise InvalidInputError(
-                f"cell set {name!r} of {source} must list cells of each of the {len(blocks)} blocks of "
-                "cells, it does not: meshio misunderstands a set of sets; list the cells themselves, or name "
-                'the bodies otherwise (labels="pieces", or the name of cell data)'
+                f"cell set {name!r} of {source} must list cells of each of the {len(blocks)} blocks, it may "
+                "be a set of sets: list the cells, or choose other labels, such as 'pieces' or cell data"
             )
         sets[name] = members
     return sets
@@ -246,16 +244,12 @@ def _tag_array(
     whole = [name for name, data in mesh.cell_data.items() if _holds_integers(data, blocks)]
     if labels in ("sets", "blocks", "pieces"):
         if labels == "sets" and not have_sets:
-            raise InvalidInputError(
-                f'labels="sets" needs cell sets, {source} has none: it has the cell data with integers '
-                f"{whole}"
-            )
+            raise InvalidInputError(f'labels="sets" needs cell sets, {source} has none: it has {whole}')
         return None
     if labels is not None:
         if labels not in whole:
             raise InvalidInputError(
-                f"labels must name cell data with integers, or be 'sets', 'blocks' or 'pieces', {source} has "
-                f"no such data {labels!r}: it has {whole or 'none at all'}"
+                f"labels must be 'sets', 'blocks', 'pieces' or cell data of integers {whole}, got {labels!r}"
             )
         return labels
     if have_sets:
@@ -263,8 +257,7 @@ def _tag_array(
     candidates = [name for name in _USUAL if name in whole] or [n for n in whole if n not in _NO_LABELS]
     if len(candidates) > 1:
         raise InvalidInputError(
-            f"one kind of cell data must say what body a cell is part of, {source} has {candidates}: give "
-            "labels=, the name of one of them"
+            f"one kind of cell data must say what bodies are, {source} has {candidates}: give labels="
         )
     return candidates[0] if candidates else None
 
@@ -323,7 +316,7 @@ def _facets(members: Mapping[Label, Members], blocks: Sequence[Block]) -> Facets
         corners = [
             block.facets[part]
             for part, block in zip(parts, blocks, strict=True)
-            if part.size and block.facets is not None
+            if part.size and block.facets.size
         ]
         if corners and label != 0:
             facets[label] = corners
@@ -333,7 +326,7 @@ def _facets(members: Mapping[Label, Members], blocks: Sequence[Block]) -> Facets
 def _by_block(blocks: Sequence[Block]) -> Groups:
     chosen = [block for block in blocks if block.kind and block.size]
     return {
-        f"block {number}": {str(block.kind): block.start + np.arange(block.size)}
+        f"block {number}": {block.kind: block.start + np.arange(block.size)}
         for number, block in enumerate(chosen, 1)
     }
 
@@ -363,13 +356,9 @@ def _check_all_labelled(groups: Groups, cells: Mapping[str, np.ndarray], word: s
     """Reject a mesh with cells in no group: they would be lost silently."""
     for kind, nodes in cells.items():
         there = [group[kind] for group in groups.values() if kind in group]
-        left = np.setdiff1d(np.arange(len(nodes)), np.concatenate(there) if there else [])
-        if left.size:
-            raise InvalidInputError(
-                f"every cell must have a {word}, which says what body it is, {left.size} of {len(nodes)} "
-                f"cells of type {kind} of {source} have none: give the rest one of its own, or say with "
-                "bodies= which are wanted"
-            )
+        fits = np.isin(np.arange(len(nodes)), np.concatenate(there) if there else [])
+        remedy = "give the rest one of its own, or say with bodies= which are wanted"
+        check_each(fits, labelled(word, source), remedy, f"of type {kind} cell {{}}".format)
 
 
 @naming_arguments
@@ -486,8 +475,7 @@ def read_with_meshio(path: Path, file_format: str | None = None) -> meshio.Mesh:
     endings = ["".join(path.suffixes[-2:]).lower(), path.suffix.lower()]
     if file_format is None and not any(ending in known for ending in endings):
         raise InvalidInputError(
-            f"file '{path}' must end in one of {' '.join(sorted(known))}, which say what is in it: rename "
-            "it, or give file_format"
+            f"file '{path}' must end in one of {' '.join(sorted(known))}: rename it, or give file_format"
         )
     return _read_by_meshio(path, file_format)
 
@@ -503,14 +491,12 @@ def _read_by_meshio(path: Path, file_format: str | None) -> meshio.Mesh:
             return meshio.read(path, file_format)
     except ImportError as reason:
         raise InvalidInputError(
-            f"meshio needs the library {reason.name!r} to read file '{path}', it is not installed: install "
-            f"it (pip install {reason.name}), or save the mesh in another format, .vtu for instance"
+            f"meshio needs the library {reason.name!r} to read '{path}': pip install {reason.name}"
         ) from reason
     except (Exception, SystemExit) as reason:
         words = " ".join(f"{said.getvalue()} {'' if isinstance(reason, SystemExit) else reason}".split())
         raise InvalidInputError(
-            f"file '{path}' must be a mesh that meshio can read, it says: {words or type(reason).__name__}: "
-            "check its format, or save the mesh in another one, .vtu for instance"
+            f"file '{path}' must be a mesh that meshio can read, it says: {words or type(reason).__name__}"
         ) from reason
 
 

@@ -60,8 +60,7 @@ def _read(path: Path, scale: float, smooth: float, file_format: str | None) -> T
     if not parts:
         kinds = ", ".join(sorted({block.type for block in mesh.cells})) or "nothing"
         raise InvalidInputError(
-            f"file '{path}' must hold the triangles of a closed surface, it has {kinds}: export the surface "
-            "of the body, as STL"
+            f"file '{path}' must hold the triangles of a closed surface (STL), it has {kinds}"
         )
     try:
         return Triangulation(scale * np.asarray(mesh.points, dtype=np.float64), np.concatenate(parts), smooth)

@@ -230,7 +230,7 @@ MISTAKES = [
     (("Block-1.1, 1, 2", "Block-1.999, 1, 2"), r"\*BOUNDARY: BLOCK-1\.999 is not there"),
     (("Block-1.1, 1, 2", "Block-1.88, 1, 2"), r"\*BOUNDARY: node BLOCK-1\.88 is not there"),
     (("*End Part\n*Part", "*Tie, name=a\n*End Part\n*Part"), r"\*TIE: this card is not supported within"),
-    (("  0., 0., 1.\n", "  0., 0., 1.\n 0., 0., 1.\n"), r"\*INSTANCE: a rotation needs two points and"),
+    (("  0., 0., 1.\n", "  0., 0., 1.\n 0., 0., 1.\n"), r"\*INSTANCE: needs two points and an angle, got"),
     (("Plate-1, part=Plate", "Plate-1, library=old"), r"\*INSTANCE: the parameter LIBRARY is not read"),
     (("Block-1.A_X0", "Block-1.A_X7"), r"node set 'BLOCK-1\.A_X7' is not there; did you mean BLOCK"),
 ]  # fmt: skip

@@ -263,7 +263,7 @@ WRONG = [
     ("*BOUNDARY\n17, 4, 4, 0.1\n", r"17 has no rotation that can be prescribed"),
     ("*EQUATION\n2\n17, 1, 1., 18, 4, 2.\n", r"component 4 of a node of elements is no displacement"),
     ("*EQUATION\n1\n501, 1, 1.\n", r"needs a node of an element"),
-    ("*EQUATION\n2\n17, 1, 1., 501, 1, 1.\n", r"node 501 belongs to no element: give component 1"),
+    ("*EQUATION\n2\n17, 1, 1., 501, 1, 1.\n", r"node 501 has no element: give component 1"),
     ("*EQUATION\n2\n17, 1, 1.\n", r"needs 2 terms of node, component and factor"),
     ("*EQUATION\n2\nBAR_X1, 1, 1., 18, 1, -1.\n", r"needs single nodes, got a set of several"),
     ("*EQUATION, REMOVE\n1\n", r"REMOVE is not read"),

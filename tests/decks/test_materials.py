@@ -146,7 +146,7 @@ def test_21_stiffnesses_are_in_their_places(tmp_path: Path) -> None:
     [
         ("*ELASTIC, TYPE=ANISO\n1., 2., 1.\n", False, r"moduli must give a positive energy"),
         ("*DENSITY\n1.\n", False, r"needs \*ELASTIC or \*HYPERELASTIC behind it, has \*DENSITY"),
-        ("*HYPERELASTIC, YEOH\n1., 0.\n", True, r"the model YEOH is not supported"),
+        ("*HYPERELASTIC, YEOH\n1., 0.\n", True, r"YEOH is not supported"),
         ("*HYPERFOAM\n1., 2., 0.1\n", False, r"needs NLGEOM in its \*STEP"),
         ("*HYPERFOAM\n1., 2., 0.6\n", True, r"poisson_ratios must lie between 0 and 0.5"),
         ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.2\n", True, r"compressibility terms D2, D3"),

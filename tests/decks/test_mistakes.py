@@ -76,7 +76,7 @@ WRONG = [
         "*CLOAD\nBAR_X1, 1, 10.",
         "*DLOAD\nBAR, P7, 1.",
         "P7",
-        r"C3D8 has faces P1 to P6, got 'P7'",
+        r"C3D8 has 6 faces, got 'P7'",
     ),
     ("*CLOAD\nBAR_X1, 1, 10.", "*DLOAD\nBAR, P4, 1.", "P4", r"a face of element 1 lies between two elements"),
     (

@@ -143,9 +143,7 @@ def test_nodes_on_the_axis_of_a_cylinder_are_held_across_it_as_a_whole(tmp_path:
     np.testing.assert_allclose(
         turned.gather_displacement("BAR"), expected, atol=1e-9 * np.abs(expected).max()
     )
-    with pytest.raises(
-        DeckError, match=r"node 1 is on the axis of the cylinder: hold components 1 and 2 both at zero"
-    ):
+    with pytest.raises(DeckError, match=r"node 1 is on the axis of the cylinder: hold 1 and 2 at zero"):
         read_deck(deck(tmp_path, rolling))
 
 
@@ -194,7 +192,7 @@ def test_what_is_wrong_in_lines_of_single_elements_is_named_by_its_line(tmp_path
     lines = (plate + step("*DLOAD\n1, P2, 6.\n2, P2, 6.\n")).splitlines()
     for wrong, message in (
         ("7, P2, 6.", "element 7 is not there"),
-        ("2, P9, 6.", "got 'P9': correct the label"),
+        ("2, P9, 6.", "got 'P9'"),
     ):
         text = "\n".join(wrong if line == "2, P2, 6." else line for line in lines)
         with pytest.raises(DeckError, match=message) as refused:

@@ -51,15 +51,11 @@ def test_a_missing_hdf5_file_is_answered_with_what_dolfinx_says(tmp_path: Path) 
 def test_a_tag_that_is_not_there_is_answered_with_those_that_are(tmp_path: Path) -> None:
     mesh = bar("tetrahedron")
     path = write(tmp_path / "bar.xdmf", mesh, cell_tags(mesh), facet_tags(mesh))
-    with pytest.raises(
-        InvalidInputError, match=r"body 'bar' needs the cell tag 7, which file .* it has 1, 2$"
-    ):
+    with pytest.raises(InvalidInputError, match=r"body 'bar' needs the cell tag 7, file .* has 1, 2$"):
         read_xdmf(path, {"bar": [1, 7]})
-    with pytest.raises(InvalidInputError, match=r"surface 'top' needs the facet tag 9, .* it has 3, 4$"):
+    with pytest.raises(InvalidInputError, match=r"surface 'top' needs the facet tag 9, .* has 3, 4$"):
         read_xdmf(path, surfaces={"top": 9})
-    with pytest.raises(
-        InvalidInputError, match=r"surface 'top' needs the facet tag 9, .* it has none at all"
-    ):
+    with pytest.raises(InvalidInputError, match=r"surface 'top' needs the facet tag 9, .* has none at all"):
         read_xdmf(write(tmp_path / "plain.xdmf", mesh), surfaces={"top": 9})
 
 
@@ -67,7 +63,7 @@ def test_a_cell_without_a_tag_is_refused() -> None:
     mesh = bar("triangle")
     tags = dolfinx.mesh.meshtags(mesh, 2, np.arange(12, dtype=np.int32), np.ones(12, dtype=np.int32))
     with pytest.raises(
-        InvalidInputError, match=r"every cell must have a tag, .* 4 of 16 cells of mesh of dolfinx"
+        InvalidInputError, match=r"every cell of mesh of dolfinx must have a tag, .* 4 of 16 do not"
     ):
         from_dolfinx(mesh, tags)
 
@@ -86,13 +82,13 @@ def test_a_tagged_facet_inside_a_body_is_refused() -> None:
 @pytest.mark.parametrize(
     ("cells", "message"),
     [
-        ({"wedge": [[0, 1, 2, 4, 5, 6]]}, "of type 'wedge': mesh it without prisms and pyramids"),
+        ({"wedge": [[0, 1, 2, 4, 5, 6]]}, "has 'wedge': mesh it without"),
         (
             {"hexahedron20": [[*range(8), *range(8), *range(4)]]},
             "'(hexahedron_20|hex_20)': such cells are not read: .* linear or quadratic ones",
         ),
         ({"quad": [[0, 1, 2, 3]], "triangle": [[4, 5, 6]]}, r"is mixed: write .* \(facet_file=\.\.\.\)"),
-        ({"line": [[0, 1]]}, r"must have a mesh of tetrahedra, .* it has 'Grid' \(polyline\)"),
+        ({"line": [[0, 1]]}, r"must have tetrahedra, .* it has 'Grid' \(polyline\)"),
         ({"quad": [[0, 1, 2, 3], [4, 5, 6, 7]]}, "plane of constant z, those of file .* reach over 1 in z"),
         (
             {"quad": [[0, 1, 2, 3], [0, 1, 5, 4]]},
@@ -138,5 +134,5 @@ def test_a_cell_flipped_over_its_neighbour_is_refused(meshio: ModuleType, tmp_pa
 
 def test_a_mesh_of_dolfinx_of_third_order_is_refused() -> None:
     mesh = third_order_triangle()
-    with pytest.raises(InvalidInputError, match="'triangle' of order 3: such cells are not read"):
+    with pytest.raises(InvalidInputError, match="triangle of order 3: such cells are not read"):
         from_dolfinx(mesh)

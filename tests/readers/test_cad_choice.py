@@ -116,9 +116,7 @@ def test_what_chooses_nothing_is_told_which_faces_there_are(plate: Path) -> None
 
 
 def test_a_face_cannot_be_two_surfaces(plate: Path) -> None:
-    with pytest.raises(
-        InvalidInputError, match=r"face \d+ of .* is chosen for 'all' and for 'hole': .* it has 1"
-    ):
+    with pytest.raises(InvalidInputError, match=r"face \d+ of .* cannot be of 'all' and 'hole': it has 1"):
         read(plate, all=InBox((-1, -1, -1), (9, 9, 9)), hole=OnCylinder(0.2))
 
 
@@ -198,7 +196,7 @@ def test_surfaces_and_bodies_have_their_own_sizes(plate: Path, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("sizes", "words"),
     [
-        ({"holes": 0.1}, r"a size must be of a body or a surface of .*'hole'; got 'holes': correct the name"),
+        ({"holes": 0.1}, r"sizes are of bodies and surfaces of .*'hole', got 'holes'"),
         ({"hole": 0.0}, "size of 'hole' must be above zero, got 0.0"),
         ({"hole": "fine"}, "size of 'hole' must be a finite number"),
     ],

@@ -226,9 +226,7 @@ def test_values_of_quadratic_meshes_come_back_too() -> None:
     expected = _dolfinx.fem.Function(space)
     expected.interpolate(lambda x: x**2)
     np.testing.assert_allclose(found.x.array, expected.x.array, atol=1e-14)
-    with pytest.raises(
-        InvalidInputError, match="Lagrange elements, of degree 2 or higher like the mesh, or of"
-    ):
+    with pytest.raises(InvalidInputError, match="Lagrange of degree 2 or higher, or degree 0"):
         bodies.function_on(vector_space(mesh, 1), {"mesh": values})
 
 
@@ -242,7 +240,7 @@ def test_what_does_not_fit_the_space_is_refused() -> None:
     assert "48 tetrahedra" in repr(bodies)
     for values, words in (
         ({"3": alike["1"]}, r"knows the bodies \['1', '2'\], got '3'"),
-        ({"1": alike["1"][1:]}, r"body '1' must have shape \(27, 3\), its nodes and .* got \(26, 3\)"),
+        ({"1": alike["1"][1:]}, r"values of '1' must have shape \(27, 3\), got \(26, 3\)"),
         ({"1": alike["1"], "2": alike["2"] + 1.0}, r"share nodes .* differ by up to 1: bring them back one"),
     ):
         with pytest.raises(InvalidInputError, match=words):

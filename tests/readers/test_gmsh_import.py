@@ -180,7 +180,7 @@ def test_a_model_that_is_not_meshed_is_refused(gmsh: ModuleType) -> None:
 def test_a_volume_without_a_group_is_named(gmsh: ModuleType) -> None:
     two_boxes(gmsh)
     gmsh.model.removePhysicalGroups(gmsh.model.getPhysicalGroups(3)[-1:])
-    message = r"volumes \[2\] of model 'press' are in none: name them with gmsh\.model\.addPhysicalGroup\(3"
+    message = r"volumes \[2\] of model 'press' are in none: use gmsh\.model\.addPhysicalGroup\(3"
     with pytest.raises(InvalidInputError, match=message):
         from_gmsh_model()
 
@@ -188,7 +188,7 @@ def test_a_volume_without_a_group_is_named(gmsh: ModuleType) -> None:
 def test_a_cell_of_two_bodies_or_regions_is_refused(gmsh: ModuleType) -> None:
     two_boxes(gmsh)
     name(gmsh, 3, [1, 2], "all")
-    with pytest.raises(InvalidInputError, match=r"belong to 'tool' and 'all': say which physical volumes"):
+    with pytest.raises(InvalidInputError, match=r"are of 'tool' and 'all': say which physical volumes"):
         from_gmsh_model()
     with pytest.raises(
         InvalidInputError, match=r"cells of body 'press' of model 'press' belong to 'tool' and 'all'"
@@ -222,14 +222,14 @@ def test_bodies_that_touch_without_sharing_nodes_stay_two_and_make_no_one(gmsh: 
     [
         (
             (["anvil"],),
-            r"body 'anvil' needs the physical volume 'anvil', which file .* not have: it has 'table', 'tool'",
+            r"body 'anvil' needs the physical volume 'anvil', file .* has 'table', 'tool'",
         ),
         (({"press": ["tool", "die"]},), "body 'press' needs the physical volume 'die'"),
         (
             (None, ["side"]),
-            "surface 'side' needs the physical surface 'side', .* it has 'bottom', 'top', 'interface'",
+            "surface 'side' needs the physical surface 'side', .* has 'bottom', 'top', 'interface'",
         ),
-        (({},), "must have a physical volume for a body"),
+        (({},), "has no physical volume for a body"),
     ],
 )
 def test_a_name_that_is_not_there_is_answered_with_those_that_are(
