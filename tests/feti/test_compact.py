@@ -131,7 +131,7 @@ def test_what_single_precision_does_not_reach_by_smalse_is_refused() -> None:
     system = DualSystem(
         build_torn_system(scene, decompose(scene, partitions, MPI.COMM_SELF)), kind=LocalKind.COMPACT
     )
-    message = "SMALSE needs double precision for residuals below 1e-05, got the tolerance 1e-06"
+    message = "SMALSE needs subdomains in double precision below a tolerance of 1e-05, got 1e-06"
     with pytest.raises(InvalidInputError, match=message):
         solve(system.problem, None, Smalse(tolerance=1e-6))
     assert solve(system.problem, None, Smalse(tolerance=1e-4)).residuals.within(1e-4)

@@ -149,9 +149,7 @@ def test_a_stress_without_an_energy_is_refused(cell: str) -> None:
 
 @pytest.mark.parametrize("cell", CELLS)
 def test_a_negative_energy_is_refused(cell: str) -> None:
-    with pytest.raises(
-        InvalidInputError, match=r"energy of a material must not be negative, Model has the eigen"
-    ):
+    with pytest.raises(InvalidInputError, match=r"energy of Model must not be negative, got eigenvalue -0"):
         prepare(Model(shear=-0.1), cell)
 
 
@@ -251,7 +249,9 @@ def test_a_kernel_that_a_subdomain_resists_is_refused_with_its_name() -> None:
     K = element_stiffness(vertices, "quadrilateral", isotropic_matrix(1.0, 0.3, 2))
     R = rigid_body_modes(vertices).reshape(8, 3)
     check_kernel(K, R, "subdomain 3 of body 'plate'")
-    with pytest.raises(InvalidInputError, match="that of subdomain 3 of body 'plate' does not"):
+    with pytest.raises(
+        InvalidInputError, match="the kernel of subdomain 3 of body 'plate' must hold motions without"
+    ):
         check_kernel(K, R + 1e-6 * vertices.reshape(8, 1), "subdomain 3 of body 'plate'")
 
 
@@ -261,7 +261,9 @@ def wrong_on_many_points(points: np.ndarray) -> np.ndarray:
 
 def test_the_kernel_is_checked_on_every_subdomain() -> None:
     mesh = block((0,) * 3, (1,) * 3, (2, 1, 1))
-    with pytest.raises(InvalidInputError, match=r"that of subdomain 0 of body 'cell' does not .*annihilates"):
+    with pytest.raises(
+        InvalidInputError, match=r"the kernel of subdomain 0 of body 'cell' must hold .*annihilates"
+    ):
         whole(Body(mesh, Model(wrong_on_many_points)))
 
 
@@ -419,7 +421,7 @@ def test_what_is_wrong_is_named(spoilt: str, message: str) -> None:
 
 
 def test_large_deformations_need_a_stress_that_turns() -> None:
-    with pytest.raises(InvalidInputError, match=r"TurningDamper \(finite = True\) must turn with the"):
+    with pytest.raises(InvalidInputError, match=r"the stress of TurningDamper must turn with the"):
         check_history_material(TurningDamper())
 
 
