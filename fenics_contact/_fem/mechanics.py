@@ -412,3 +412,25 @@ class LinearMechanics:
     def least_jacobian(self, displacement: np.ndarray) -> float:
         """Return 1: in small strain no volume changes."""
         return 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class DependentDofs:
+    """`Mechanics` of some dofs by those of others that depend on them.
+
+    `rows`: values of the dofs of `mechanics` by those of the others, a sparse matrix.
+    """
+
+    mechanics: Mechanics
+    rows: sp.csr_matrix
+
+    def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
+        """Evaluate the materials and assemble; see `Mechanics.at`."""
+        origin = None if step.origin is None else np.asarray(self.rows @ step.origin)
+        response = self.mechanics.at(np.asarray(self.rows @ displacement), replace(step, origin=origin))
+        forces = replace(response, force=np.asarray(self.rows.T @ response.force))
+        return forces.with_matrices(lambda matrix: (self.rows.T @ matrix @ self.rows).tocsr())
+
+    def least_jacobian(self, displacement: np.ndarray) -> float:
+        """Return the smallest det F at a Gauss point."""
+        return self.mechanics.least_jacobian(np.asarray(self.rows @ displacement))

@@ -190,9 +190,9 @@ class MixedMesh(SubdomainMesh):
 
     def answering(self, mechanics: Mechanics) -> Mechanics:
         """Return the mechanics of the dofs by those of dolfinx's."""
-        from fenics_contact.feti.several_shapes import OfHexahedra  # of large deformations alone
+        from fenics_contact._fem.mechanics import DependentDofs  # of large deformations alone
 
-        return OfHexahedra(self, mechanics)
+        return DependentDofs(mechanics, self.on_dofs)
 
     def _matched(self, body: Body, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         columns = _dolfinx.facet_corners(body.mesh.cell_type)

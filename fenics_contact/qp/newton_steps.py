@@ -99,10 +99,6 @@ class Forcing:
         return care * max(term, 0.3 * self.tolerance / max(worst, self.tolerance))
 
 
-#: Parts of a step that are tried where its end is worse.
-SHORTER = (0.5, 0.25, 0.1)
-
-
 @dataclass(frozen=True, eq=False)
 class Damped(Generic[Point]):
     """The point that is taken and the fraction of the step that led to it."""
@@ -117,19 +113,20 @@ def damp(
     measured: Callable[[Point], Residuals],
     earlier: Iterable[Residuals],
     *,
-    fractions: tuple[float, ...] = SHORTER,
+    fractions: tuple[float, ...] = (0.5, 0.25, 0.1),
+    shortest: tuple[float, ...] = (),
 ) -> Damped[Point]:
     """Return the end of a step, or the best of a few points on it if that is worse. Collective.
 
     Where the active set alternates between two faces the solution lies between them. The way to the right
     face may lead over a worse one: a full step is taken if it improves on either of the last two points.
     `earlier`: those of the last two points; `fractions`: parts of the step that are tried where its end is
-    worse.
+    worse; `shortest`: more of them.
     """
     end = measured(full)
     if any(not end.is_worse_than(old) for old in earlier):
         return Damped(full, 1.0)
-    tried = [Damped(full, 1.0), *(Damped(at(part), part) for part in fractions)]
+    tried = [Damped(full, 1.0), *(Damped(at(part), part) for part in (*fractions, *shortest))]
     return min(tried, key=lambda each: measured(each.point).worst_in_scales_with(end))
 
 
@@ -229,7 +226,7 @@ def shorten(
         lambda part: iterate_between(problem, before, after, part),
         lambda iterate: iterate.residuals,
         (before.residuals, *earlier),
-        fractions=(*SHORTER, shortest) if before.residuals.worst < near else SHORTER,
+        shortest=(shortest,) if before.residuals.worst < near else (),
     )
 
 

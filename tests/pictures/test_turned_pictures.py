@@ -67,7 +67,7 @@ def test_pictures_turn_sections_their_values_and_obstacles(
         assert isinstance(ball, Sphere)
         assert ball.centre == pytest.approx((0.0, 0.0, 1.9))
         assert floor == Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    assert drawn[0][2]["spot"] is None
+    assert "spot" not in drawn[0][2]
     assert drawn[1][1].label == "stress of cells, zz of the section (MPa)"
     np.testing.assert_allclose(drawn[1][1].values["disc"], np.tile(hoop, 18))
     np.testing.assert_allclose(drawn[2][1].values["disc"], np.tile(np.arange(len(hoop)), 18))

@@ -190,7 +190,7 @@ MUTATIONS = (
     Mutation(
         "reactions of rigid surfaces contain the loads at their points",
         "results/forces.py",
-        "total = total - forces.point_load(support, point, scene.kinematics)",
+        "total = total - forces.point_load(rigid, point, scene.kinematics)",
         "pass",
         (f"{RIGID}::test_a_rigid_surface_is_a_support_that_moves_by_itself",),
     ),
