@@ -54,7 +54,7 @@ class ConstraintTerm:
 
     def __post_init__(self) -> None:
         """Make arrays, and reject those that do not fit."""
-        if not isinstance(self.nodes, str):
+        if not self.set_name:
             self._set("nodes", self._array("nodes", np.int64, (1,)))
         if not (isinstance(self.direction, str) and self.direction in _AXES):
             given = self._array("direction", np.float64, (1, 2))
@@ -80,6 +80,11 @@ class ConstraintTerm:
                 f"arrays of a ConstraintTerm must have one entry for each node, got {sorted(sizes)} of body "
                 f"{self.body!r}: give as many of each"
             )
+
+    @property
+    def set_name(self) -> str:
+        """Name of its nodes, empty if they are given by numbers."""
+        return self.nodes if isinstance(self.nodes, str) else ""
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -116,18 +121,18 @@ class ConstraintTerm:
 
     def __hash__(self) -> int:
         """Return a hash of what is no array."""
-        return hash((self.body, self.nodes if isinstance(self.nodes, str) else len(self.nodes)))
+        return hash((self.body, self.set_name or len(self.nodes)))
 
     @property
     def in_words(self) -> str:
         """Which nodes it has."""
-        if isinstance(self.nodes, str):
-            return f"{self.body} {self.nodes}"
+        if self.set_name:
+            return f"{self.body} {self.set_name}"
         return f"{len(self.nodes)} nodes of {self.body}"
 
     def nodes_of(self, mesh: BodyMesh) -> np.ndarray:
         """Return its nodes in the mesh of its body."""
-        return mesh.nodes_to_hold(self.nodes) if isinstance(self.nodes, str) else np.asarray(self.nodes)
+        return mesh.nodes_to_hold(self.set_name) if self.set_name else np.asarray(self.nodes)
 
     def vectors(self, count: int, dim: int) -> np.ndarray:
         """Return c d of its nodes, shape (count, dim)."""
@@ -189,7 +194,7 @@ class LinearConstraint(Part):
         for term in self.terms:
             mesh = body_of(scene, term.body, "ConstraintTerm").mesh
             known = [*mesh.surfaces, *mesh.node_sets]
-            if isinstance(term.nodes, str) and term.nodes not in known:
+            if term.set_name and term.set_name not in known:
                 raise InvalidInputError(
                     f"ConstraintTerm names nodes {term.nodes!r} of body {term.body!r}, which has "
                     f"{sorted(known)}: use one of them, or numbers"
@@ -256,7 +261,7 @@ class LinearConstraint(Part):
     def _nodes(self, term: ConstraintTerm, mesh: BodyMesh) -> np.ndarray:
         """Return the nodes of a term, and reject what its mesh does not have."""
         nodes, dim = term.nodes_of(mesh), mesh.dim
-        if not isinstance(term.nodes, str) and (nodes.min() < 0 or nodes.max() >= mesh.n_nodes):
+        if not term.set_name and (nodes.min() < 0 or nodes.max() >= mesh.n_nodes):
             raise InvalidInputError(
                 f"ConstraintTerm.nodes of body {term.body!r} must lie between 0 and {mesh.n_nodes - 1}, got "
                 f"{nodes.min()} to {nodes.max()}: its mesh has no others"

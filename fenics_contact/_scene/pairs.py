@@ -473,16 +473,19 @@ class ContactPair(PairPart):
         return callable(self.friction_value)
 
     @property
+    def _coefficient(self) -> object:
+        """Coulomb's friction coefficient, zero without one."""
+        return self.friction.friction_coefficient if isinstance(self.friction, Coulomb) else 0.0
+
+    @property
     def friction_curve(self) -> FrictionCurve | None:
         """How friction follows the pressure where it is not proportional to it."""
-        given = self.friction.friction_coefficient if isinstance(self.friction, Coulomb) else None
-        return given if isinstance(given, FrictionCurve) else None
+        return self._coefficient if isinstance(self._coefficient, FrictionCurve) else None
 
     @property
     def slip_table(self) -> SlipTable | None:
         """How the friction coefficient follows the slip; None where it does not."""
-        given = self.friction.friction_coefficient if isinstance(self.friction, Coulomb) else None
-        return given if isinstance(given, SlipTable) else None
+        return self._coefficient if isinstance(self._coefficient, SlipTable) else None
 
     @property
     def shear_limit(self) -> float | OfPosition | None:

@@ -80,7 +80,7 @@ class Spring(Part):
                 "surface, or the coordinates of a fixed point"
             )
         object.__setattr__(self, "stiffness", floats(numbers) if numbers.ndim else float(numbers))
-        if not isinstance(self.second, Surface):
+        if "second" not in self.surfaces:
             object.__setattr__(self, "second", floats(np.asarray(self.second, dtype=np.float64)))
 
     @property
@@ -88,13 +88,18 @@ class Spring(Part):
         """Its name, by default both ends."""
         if self.name:
             return self.name
-        other = self.second
-        return f"{self.first.in_words} to {other.in_words if isinstance(other, Surface) else 'ground'}"
+        others = [surface.in_words for surface in self.surfaces.values()][1:]
+        return " to ".join([self.first.in_words, *(others or ["ground"])])
+
+    @property
+    def along_axes(self) -> tuple[float, ...]:
+        """Its stiffness along each axis, empty if it acts along its line."""
+        return self.stiffness if isinstance(self.stiffness, tuple) else ()
 
     @property
     def place(self) -> str:
         """Where it is and how stiff, in words."""
-        along = "along each axis" if isinstance(self.stiffness, tuple) else "along its line"
+        along = "along each axis" if self.along_axes else "along its line"
         drawn = f", tension {self.tension:g}" if self.tension else ""
         return f"{self.label}, {self.stiffness} {along}{drawn}"
 
@@ -106,12 +111,13 @@ class Spring(Part):
 
     def centres(self, scene: Around) -> np.ndarray:
         """Return the centroids of both ends, shape (2, dim), [length]."""
-        return np.array([_centre(scene, end) for end in (self.first, self.second)])
+        found = [centroid(scene, end.body, end.name) for end in self.surfaces.values()]
+        return np.array(found if len(found) == 2 else [*found, np.asarray(self.second, dtype=np.float64)])
 
     def rows(self, scene: Around) -> tuple[np.ndarray, np.ndarray]:
         """Return the directions in which it acts, unit vectors, (n, dim), and its stiffness in each, (n,)."""
-        if isinstance(self.stiffness, tuple):
-            numbers = np.array(self.stiffness)
+        if self.along_axes:
+            numbers = np.array(self.along_axes)
             return np.eye(scene.kinematics.dim)[numbers > 0.0], numbers[numbers > 0.0]
         line = np.diff(self.centres(scene), axis=0)
         line /= np.linalg.norm(line)
@@ -130,8 +136,8 @@ class Spring(Part):
                     f"Spring.{name} of {self.label!r} must have {dim} finite numbers, got {given!r}: give "
                     "one for each axis"
                 )
-        if isinstance(self.stiffness, tuple):
-            across = revolved and self.stiffness[0] > 0.0
+        if self.along_axes:
+            across = revolved and self.along_axes[0] > 0.0
         else:
             line = np.diff(self.centres(scene), axis=0)[0]
             size = max(float(np.abs(body.mesh.points).max()) for body in scene.bodies.values())
@@ -165,9 +171,3 @@ def mean_weights(scene: Around, surface: Surface) -> tuple[np.ndarray, np.ndarra
         np.add.at(sums, some, nodal_areas(mesh.points, some, scene.bodies[surface.body].kinematics.measure))
     nodes = np.unique(facets)
     return nodes, sums[nodes] / sums.sum()
-
-
-def _centre(scene: Around, end: Surface | GivenVector) -> np.ndarray:
-    if not isinstance(end, Surface):
-        return np.asarray(end, dtype=np.float64)
-    return centroid(scene, end.body, end.name)
