@@ -101,13 +101,16 @@ class ContactPoints:
     ) -> Self:
         """Return points at nodes of slaves, by default with what is measured, off facets and planes."""
         (count, dim), none, axes = normal.shape, np.full(len(slave), -1), reference_axes(normal)
-        at_nodes = sp.csr_matrix((np.ones(count), slave, np.arange(count + 1)), shape=master.shape)
+        if "own" not in more:
+            entries = np.ones(count), slave, np.arange(count + 1)
+            more["own"] = sp.csr_matrix(entries, shape=master.shape)
+        if "merged_nodes" not in more:
+            more["merged_nodes"] = sp.csr_matrix((count, 0), dtype=np.int64)
         values: dict[str, Any] = {
             "tangents": tangent_frames(normal, axes), "facet": none, "local": np.zeros((count, dim - 1)),
             "axes": axes, "symmetric": np.zeros((count, dim), dtype=bool), "distance": gap,
-            "given": np.zeros(count, dtype=bool), "own": at_nodes, "slave_facet": none,
+            "given": np.zeros(count, dtype=bool), "slave_facet": none,
             "slave_local": np.zeros((count, dim - 1)), "oblique_normals": np.zeros((count, 0, dim)),
-            "merged_nodes": sp.csr_matrix((count, 0), dtype=np.int64),
         }  # fmt: skip
         parts = {"pair": pair, "slave": slave, "master": master, "normal": normal, "gap": gap, "area": area}
         return cls(**parts, **(values | more))

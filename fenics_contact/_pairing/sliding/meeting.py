@@ -131,14 +131,16 @@ class Candidates:
         self, chosen: np.ndarray, normal: np.ndarray, distance: np.ndarray, weights: sp.csr_matrix
     ) -> ContactPoints:
         """Return points at candidates, without facets."""
-        own, pair, gap = self.own[chosen], np.full(len(chosen), self.number), distance + self.offset[chosen]
-        entries = own.data, self.slave_nodes[own.indices], own.indptr
-        return ContactPoints.at_nodes(
+        pair, gap, facet = np.full(len(chosen), self.number), distance + self.offset[chosen], self.on_facet
+        points = ContactPoints.at_nodes(
             pair, self.nodes[chosen], weights, normal, gap, self.area[chosen], distance=distance,
-            given=self.given[chosen], own=sp.csr_matrix(entries, shape=weights.shape),
-            slave_facet=self.on_facet[chosen], slave_local=self.on_local[chosen],
-            merged_nodes=self.merged_nodes[chosen],
+            given=self.given[chosen], merged_nodes=self.merged_nodes[chosen],
         )  # fmt: skip
+        if (facet < 0).all():
+            return points
+        own = self.own[chosen]
+        own = sp.csr_matrix((own.data, self.slave_nodes[own.indices], own.indptr), shape=weights.shape)
+        return replace(points, own=own, slave_facet=facet[chosen], slave_local=self.on_local[chosen])
 
     def joined_to(self, lost: np.ndarray, kept: np.ndarray) -> Self:
         """Return the pair without some of its nodes, whose areas others have."""
