@@ -140,8 +140,7 @@ class DolfinxBodies(Mapping[str, BodyMesh]):
             rows = rows.reshape(len(rows), -1)
             if rows.shape != (len(numbers[body]), size):
                 raise InvalidInputError(
-                    f"values of {body!r} must have shape ({len(numbers[body])}, {size}), got "
-                    f"{np.shape(given)}"
+                    f"{body!r} needs values of shape ({len(numbers[body])}, {size}), got {np.shape(given)}"
                 )
             result[body] = rows
         if degree > 0:
