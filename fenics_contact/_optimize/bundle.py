@@ -222,7 +222,7 @@ def solve(program: QuadraticProgram) -> QuadraticSolution:
         statuses.append(str(answer.status))
         if answer.status in _INFEASIBLE:
             raise InvalidInputError(
-                f"bounds and linear constraints leave no point (Clarabel: {answer.status}): relax some"
+                f"no point meets all constraints ({answer.status}): relax those that contradict each other"
             )
         if answer.status == clarabel.SolverStatus.Solved:
             return _solution(program, answer, exact=True)

@@ -189,7 +189,7 @@ def test_a_constraint_that_no_point_meets_is_reported_where_its_violation_is_lea
 def test_an_equality_that_no_point_meets_is_named() -> None:
     never = equal(lambda x: (float(x @ x) + 1.0, 2 * x), 0.5, "volume")
     with pytest.raises(
-        InvalidDesignError, match=r"starting design .* no design near it meets volume: .* misses it"
+        InvalidDesignError, match=r"starting design .* no design near it meets volume, .* misses it"
     ):
         minimize(downhill, [3.0, 2.0], METHOD, constraints=never, restore=True)
 
@@ -273,7 +273,7 @@ def test_a_run_in_pieces_takes_the_same_bits(name: str, tmp_path: Path) -> None:
     assert result.x.tobytes() == whole.x.tobytes()
     assert result.history == whole.history
     assert result.constraints == whole.constraints
-    with pytest.raises(InvalidInputError, match="differ nonlinear constraints"):
+    with pytest.raises(InvalidInputError, match="in nonlinear constraints"):
         minimize(case.fun, case.start, METHOD, bounds=case.bounds, checkpoint=checkpoint)
 
 

@@ -144,11 +144,11 @@ def test_limits_and_tolerance_may_be_changed_to_go_on(tmp_path: Path) -> None:
 
 
 CHANGES: dict[str, tuple[dict[str, Any], str]] = {
-    "start": ({"x0": np.full(2, 0.5)}, r"differ x0 \(float64 array"),
-    "size": ({"x0": np.zeros(3), "bounds": (-1.0, 1.0), "constraints": None}, r"differ variables \(2, 3\)"),
-    "bounds": ({"bounds": (-1.0, 2.0)}, r"differ constraints.upper .*; scale"),
-    "constraints": ({"constraints": LinearConstraints([[1.0, 0.0]], [0.7])}, r"differ constraints.limit"),
-    "options": ({"method": BundleTrust(locality=0.0)}, r"differ method\['locality'\] \(0.1, 0.0\)"),
+    "start": ({"x0": np.full(2, 0.5)}, r"in x0 \(float64 array"),
+    "size": ({"x0": np.zeros(3), "bounds": (-1.0, 1.0), "constraints": None}, r"in variables \(2, 3\)"),
+    "bounds": ({"bounds": (-1.0, 2.0)}, r"in constraints.upper .*; scale"),
+    "constraints": ({"constraints": LinearConstraints([[1.0, 0.0]], [0.7])}, r"in constraints.limit"),
+    "options": ({"method": BundleTrust(locality=0.0)}, r"in method\['locality'\] \(0.1, 0.0\)"),
 }
 
 

@@ -123,7 +123,9 @@ def test_failure_carries_the_history():
 
 def test_smalse_refuses_a_bound_that_follows_the_multiplier():
     problem = random_problem(2)
-    with pytest.raises(InvalidInputError, match="SMALSE needs a given slip bound, got CoulombLaw: iterate"):
+    with pytest.raises(
+        InvalidInputError, match="SMALSE needs a given slip bound, got CoulombLaw: use FaceNewton"
+    ):
         solve(problem.dual, None, Smalse(), friction_coefficient=np.full(12, 0.4))
 
 
