@@ -18,6 +18,7 @@ from fenics_contact import (
     Coulomb,
     LinearClosure,
     RigidPlane,
+    Roller,
     Scene,
     Support,
     Surface,
@@ -65,6 +66,16 @@ def test_the_surfaces_that_face_each_other_are_found_and_solved() -> None:
         forces.append(state.contact.normal_force)
     assert forces[0].sum() > 100.0
     assert forces[0] == pytest.approx(forces[1], rel=1e-6)
+
+
+def test_a_roller_that_holds_a_node_set_counts_for_the_distance() -> None:
+    upper = block((0.5, 0.5, 1.2), (2.5, 2.5, 2.2), (2, 2, 2))
+    upper = replace(upper, node_sets={"top": np.flatnonzero(upper.points[:, 2] > 2.1)})
+    bodies = {"plate": Body(LOW, STEEL), "punch": Body(upper, STEEL)}
+    pushed = Roller("punch", "top", displacement=-0.3, direction=(0.0, 0.0, 1.0))
+    found = Scene(bodies, [Support("plate", "z0"), pushed], contacts=AutomaticContact())
+    (pair,) = found.contacts
+    assert set(pair.bodies) == {"plate", "punch"}
 
 
 def test_all_pairs_have_the_law_of_closure() -> None:

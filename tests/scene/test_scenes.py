@@ -194,6 +194,11 @@ def test_friction_that_can_carry_nothing_is_not_an_effect(friction: Coulomb | Tr
     assert [effect.name for effect in stack(contacts=[pair]).effects()] == ["elasticity", "contact"]
 
 
+def test_a_stress_at_the_start_is_an_effect_and_no_load_on_a_surface() -> None:
+    stressed = stack(loads=[InitialStress("upper", (1.0, 0, 0, 0, 0, 0))])
+    assert [effect.name for effect in stressed.effects()] == ["elasticity", "initial stress"]
+
+
 def test_a_scene_without_contact_calls_for_none() -> None:
     assert [effect.name for effect in stack().effects()] == ["elasticity"]
 
