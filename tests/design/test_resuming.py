@@ -99,5 +99,5 @@ def test_what_error_went_with_which_tolerance_is_known_after_going_on(folder: Pa
 
 def test_a_checkpoint_of_another_scene_is_refused(folder: Path) -> None:
     problem = posed("chain", MPI.COMM_SELF, 1e-7)
-    with pytest.raises(InvalidInputError, match=r"differ tolerance \(1e-05, 1e-07\): give the same problem"):
+    with pytest.raises(InvalidInputError, match=r"in tolerance \(1e-05, 1e-07\): give the same problem"):
         minimised("chain", problem, Checkpoint(folder / "chain.npz"))
