@@ -95,6 +95,8 @@ class ContactResult:
             than a half of it with large deformations): where the slave's material is made for these that of
             the deformed slave, else ``nominal_area``, shape (n,), [length²] or in the plane [length].
         nominal_area: The same of the undeformed slave, shape (n,).
+        unbalanced: Ones, and zero for components of forces that balance each other around an axis of
+            revolution, shape (dim,).
         wet: Whether fluid has reached a point, shape (n,); None where no fluid is. Its pressure is no part of
             the contact pressure.
     """
@@ -109,6 +111,7 @@ class ContactResult:
     status: np.ndarray
     area: np.ndarray
     nominal_area: np.ndarray
+    unbalanced: np.ndarray
     wet: np.ndarray | None = None
 
     def _facts(self) -> dict[str, Any]:
@@ -159,10 +162,7 @@ class ContactResult:
     def normal_forces(self, pair: int = 0) -> NormalForces:
         """Return sum and resultant of the normal forces of a pair, by its number in the scene."""
         mine = self.on_pair(pair)
-        normal = self.points.normal[mine]
-        if self.points.length is not None:  # of revolution: radial ones balance each other
-            normal = normal[:, 1:2]
-        return NormalForces.of(self.normal_force[mine], normal)
+        return NormalForces.of(self.normal_force[mine], self.points.normal[mine] * self.unbalanced)
 
     @property
     def slip_in_space(self) -> np.ndarray:
@@ -213,5 +213,5 @@ def no_contact(points: ContactPoints) -> ContactResult:
     nothing, vectors = np.zeros(0), np.zeros((0, points.normal.shape[1] - 1))
     return ContactResult(
         points, nothing, vectors, nothing, nothing, vectors, vectors, np.zeros(0, dtype=np.int64), nothing,
-        nothing,
+        nothing, np.ones(points.normal.shape[1]),
     )  # fmt: skip

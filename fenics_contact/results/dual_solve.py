@@ -95,5 +95,6 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
         status,
         torn.points.area,
         torn.points.area,
+        torn.scene.kinematics.balanced,
         None if torn.fluid is None else torn.fluid.wet,
     )

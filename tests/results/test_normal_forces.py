@@ -74,6 +74,17 @@ def test_around_an_axis_radial_forces_have_no_resultant() -> None:
     assert forces.resultant == 0.0
 
 
+@pytest.mark.parametrize("thickness", [1.0, 2.0])
+def test_the_resultant_on_a_leaning_plane_is_the_sum_at_any_thickness(thickness: float) -> None:
+    block = Body(rectangle((0.0, 0.0), (2.0, 1.0), (8, 4)), PlaneStrain(E, NU, thickness=thickness))
+    pair = ContactPair(Surface("block", "y0"), RigidPlane((1.0, -0.2), (0.1, 1.0)))
+    forces = solve_scene(
+        Scene({"block": block}, [Support("block", "y1", (0.0, -0.3))], contacts=[pair]), MPI.COMM_SELF
+    ).contact.normal_forces()
+    assert forces.sum > 0.0
+    assert forces.resultant == pytest.approx(forces.sum, rel=1e-12)
+
+
 def test_every_output_names_both(state: State, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     forces = state.contact.normal_forces()
     write_result(state, tmp_path)
