@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 
@@ -27,9 +27,6 @@ from fenics_contact._scene.surface_laws import (
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import is_nonlinear
-
-if TYPE_CHECKING:
-    from fenics_contact._scene.sectors import CyclicSymmetry
 
 #: Where contact is enforced: at the slave's nodes, or weighted by its shape functions (mortar).
 Discretisation: TypeAlias = Literal["node", "mortar"]
@@ -169,8 +166,8 @@ class PairPart(Chosen, Part):
         return False
 
     @property
-    def sectors(self) -> tuple[CyclicSymmetry, ...]:
-        """The pair, if it has the sides of a sector."""
+    def sectors(self) -> tuple[Any, ...]:
+        """The pair, if it is a `CyclicSymmetry`."""
         return ()
 
     @property

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Self, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,7 +13,8 @@ from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import NodeValues, OfPosition, evaluate
 from fenics_contact._scene.local_axes import TILT, flat_normal, widest_angle
-from fenics_contact._scene.part import Around, Part, centroid, require_nodes, require_vector
+from fenics_contact._scene.part import Around, require_nodes, require_vector
+from fenics_contact._scene.support_part import SupportPart, size_along
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.kernels import motions_about
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -39,86 +39,6 @@ class HoldCurrent:
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Return the displacements of undeformed bodies: zeros, shape (n,)."""
         return np.zeros(len(points))
-
-
-class SupportPart(Part):
-    """What all supports answer.
-
-    Attributes:
-        body: Name of the body.
-        surface: Name of its surface, or of a node set of its mesh.
-    """
-
-    body: str
-    surface: str
-
-    @property
-    def rollers(self) -> tuple[Roller, ...]:
-        """The support, if it is a roller."""
-        return ()
-
-    @property
-    def rigid_surfaces(self) -> tuple[RigidSurface, ...]:
-        """The support, if it is a rigid surface."""
-        return ()
-
-    @property
-    def keeps(self) -> bool:
-        """Whether it holds something where it is when a load step begins, see `HoldCurrent`."""
-        return False
-
-    @property
-    def varies(self) -> bool:
-        """Whether it has values that are functions of position."""
-        return False
-
-    def keeping(self, points: np.ndarray, moved: np.ndarray) -> Self:
-        """Return it with displacements of its nodes, (n, components), where it keeps them."""
-        return self
-
-    def nodes_in(self, mesh: BodyMesh) -> np.ndarray:
-        """Return its nodes in the mesh of its body, ascending."""
-        return mesh.nodes_of(self.surface)
-
-    def values(self, points: np.ndarray) -> np.ndarray:
-        """Return what it prescribes at points, NaN where it prescribes nothing."""
-        return np.full(points.shape, np.nan)
-
-    def holds(self, components: int) -> np.ndarray:
-        """Return which components it holds along the axes, shape (components,)."""
-        return np.ones(components, dtype=bool)
-
-    def held(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-        """Return its nodes, ascending, and what it prescribes there along the axes, NaN where free.
-
-        Shapes (n,) and (n, components); nothing of rollers, which hold along directions of their own.
-        """
-        mesh = scene.bodies[self.body].mesh
-        nodes = mesh.nodes_to_hold(self.surface)
-        return ((nodes, self.values(mesh.points[nodes])),)
-
-    def largest_motion(self, scene: Around) -> float:
-        """Return the largest displacement that it prescribes, [length]."""
-        values = (np.nan_to_num(given) for _, given in self.held(scene))
-        return max(float(np.linalg.norm(each, axis=1).max(initial=0.0)) for each in values)
-
-    def motion_along(self, normal: np.ndarray, scene: Around) -> float:
-        """Return the largest displacement along a direction that it prescribes by numbers, [length]."""
-        return 0.0
-
-    def symmetry(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-        """Return the normal of the plane of symmetry for which it stands, if any, and its nodes there."""
-        return ()
-
-    def reference(self, scene: Around) -> np.ndarray:
-        """Return the point to which its reaction refers, shape (dim,): the centroid of its surface."""
-        return centroid(scene, self.body, self.surface)
-
-
-def _along(motion: Sequence[Component], normal: np.ndarray) -> float:
-    """Return the size of what a motion has along a direction, without what is free or a function."""
-    value = [0.0 if number is None or callable(number) else number for number in motion[: len(normal)]]
-    return abs(float(np.array(value) @ normal))
 
 
 @dataclass(frozen=True)
@@ -200,7 +120,7 @@ class Support(SupportPart):
 
     def motion_along(self, normal: np.ndarray, scene: Around) -> float:
         """Return the largest displacement along a direction that it prescribes by numbers, [length]."""
-        return _along(self.value, normal)
+        return size_along(self.value, normal)
 
     def symmetry(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
         """Return the axis of its only component, and the nodes of facets normal to it."""
@@ -568,7 +488,7 @@ class RigidSurface(SupportPart):
 
     def motion_along(self, normal: np.ndarray, scene: Around) -> float:
         """Return the displacement of its point along a direction that it prescribes, [length]."""
-        return _along(self.motion, normal)
+        return size_along(self.motion, normal)
 
     def reference(self, scene: Around) -> np.ndarray:
         """Return the point to which its reaction refers, shape (dim,)."""

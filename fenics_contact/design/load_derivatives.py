@@ -11,7 +11,8 @@ from fenics_contact import _dolfinx
 from fenics_contact._fem.load_forms import load_fields, load_parameters, loaded_cells
 from fenics_contact._fem.loads import LinearTraction, spread_traction
 from fenics_contact._scene.fields import gradients_of
-from fenics_contact._scene.loads import Load, PointForce, SurfaceLoad, TotalForce
+from fenics_contact._scene.load_part import SurfaceLoad
+from fenics_contact._scene.loads import Load, PointForce, TotalForce
 from fenics_contact._surfaces.facets import GaussPoint, gauss_points, surface_moments
 from fenics_contact.design.forms import ShapeForms, sets_in_use, sum_over_subdomains
 from fenics_contact.design.surface_derivatives import integral_pulled_back

@@ -20,10 +20,10 @@ from fenics_contact._fem.model_checks import check_kernel, kernel_of
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.foundations import ElasticFoundation
+from fenics_contact._scene.load_part import SurfaceLoad
 from fenics_contact._scene.loads import (
     Load,
     PointForce,
-    SurfaceLoad,
     initial_stress,
 )
 from fenics_contact.errors import InvalidInputError
