@@ -58,7 +58,7 @@ def check_row(values: Any, name: str, count: int) -> None:
     known = isinstance(values, Sequence | np.ndarray) and np.ndim(values) == 1 and len(values) == count
     if not known or not all(map(_is_number, values)):
         raise InvalidInputError(
-            f"{name} must be {count} finite numbers of less than {LARGEST:g}, got {brief(values)}"
+            f"{name} must be {count} finite numbers of less than {LARGEST:g}, got {brief(values)}: give them"
         )
 
 

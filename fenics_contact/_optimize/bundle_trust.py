@@ -75,12 +75,14 @@ def _refuse(constraints: tuple[NonlinearConstraint, ...], values: list[float], f
     """Raise an error that names the violated constraints, if any."""
     violations = scaled_constraints(constraints, np.array(values)).violations
     words = [
-        f"{one.name} is {value:.6g}, to lie in [{one.lower:.6g}, {one.upper:.6g}]"
+        f"{one.name} is {value:.6g}, limits [{one.lower:.6g}, {one.upper:.6g}]"
         for one, value, violation in zip(constraints, values, violations, strict=True)
         if violation > feasibility
     ]
     if words:
-        raise InvalidInputError(f"x0 must meet nonlinear constraints, {'; '.join(words)}: or restore=True")
+        raise InvalidInputError(
+            f"x0 must satisfy nonlinear constraints, but {'; '.join(words)}: change it, or set restore=True"
+        )
 
 
 @dataclass(frozen=True)

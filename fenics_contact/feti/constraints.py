@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import SuperLU, splu
 
+from fenics_contact._base.display import counted
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.following import followed_nodes
 from fenics_contact._pairing.points import HELD, ContactPoints
@@ -156,9 +157,8 @@ class ConstraintRows(Joint):
             own = slice(int(self.first[number]), int(self.first[number + 1]))
             count = own.stop - own.start
             if not isinstance(each.value, float) and len(each.value) != count:
-                raise InvalidInputError(
-                    f"LinearConstraint {each.label!r} needs 1 or {count} values, got {len(each.value)}"
-                )
+                needed = f"LinearConstraint {each.label!r} has {counted(count, 'equation')}"
+                raise InvalidInputError(f"{needed}, got {len(each.value)} values: give as many, or one")
             values[own] = each.value
         return values
 

@@ -98,8 +98,8 @@ class DirectSystem:
             norm = max(norm, float(np.finfo(float).eps) * summed)
         if not error <= WRONG**2 * norm:
             raise ConvergenceError(
-                f"the error must be below {WRONG:g}, got {np.sqrt(abs(error) / (norm or 1.0)):.1e}: "
-                "use less slender bodies and cells, or more similar materials"
+                f"a factored stiffness must have an error below {WRONG:g} in energy norm, got "
+                f"{np.sqrt(abs(error) / (norm or 1.0)):.1e}: use less slender bodies and cells"
             )
         reaction, residual = missing[self._fixed], float(np.linalg.norm(missing[free]) / scale)
         return DirectSolution(self._axes.back(displacement), reaction, residual)

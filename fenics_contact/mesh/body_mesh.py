@@ -220,7 +220,8 @@ def check_centres(centres: Centres, points: np.ndarray) -> None:
     away = np.abs(points - centres.placed(points)).max(axis=1)
     if (worst := float(away.max())) > LAST_BITS * coordinate_rounding(points):
         raise InvalidInputError(
-            f"centre {int(away.argmax())} is {worst:.3g} off its nodes: let mesh.serendipity place it"
+            f"centre node {int(away.argmax())} is {worst:.3g} away from where the nodes of its cell or face "
+            "place it: use mesh.serendipity"
         )
 
 

@@ -168,7 +168,7 @@ class FixedPoint:
             except ConvergenceError as failure:
                 steps = continued(history, failure.history, products)
                 raise StoppedError(
-                    f"the Coulomb fixed point needs {self.tolerance:.1e}, Tresca problem {number}: {failure}",
+                    f"a fixed point needs residuals below {self.tolerance:.1e}, problem {number}: {failure}",
                     steps,
                     best or start.iterate,
                 ) from failure

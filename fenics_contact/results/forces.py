@@ -197,8 +197,8 @@ class Resultant:
         """
         if len(self.force) == 2:
             raise InvalidInputError(
-                "an axis needs bodies in space, these are plane: their only axis is normal to the plane, "
-                "moment_about(point) is the torque about it, with torsion moment that about their axis"
+                "an axis needs bodies in space: use moment_about(point) for plane bodies, and moment for "
+                "bodies of revolution with torsion"
             )
         return float(np.dot(self.moment_about(point), unit_vector("the direction of an axis", direction, 3)))
 

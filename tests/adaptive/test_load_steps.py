@@ -259,7 +259,7 @@ def test_transfers_lead_from_the_meshes_of_the_state_to_those_of_the_scene() -> 
     fine = replace(scene, bodies={"block": replace(scene.bodies["block"], mesh=finer.mesh)})
     first = rolled()[0]
     state = ContactProblem(first.applied_to(scene), SELF).solve()
-    words = r"must lead from the meshes of its state to those of the scene, got others, of \[{}\]: give"
+    words = r"must lead from the meshes of the state to those of the scene, got others, of \[{}\]: give"
     for ways, named in (({}, ""), ({"block": MeshTransfer([finer])}, "'block'")):
         with pytest.raises(InvalidInputError, match=words.format(re.escape(named))):
             ContactProblem(first.applied_to(fine), SELF).solve(before=TransferredState(state, ways))

@@ -248,7 +248,7 @@ def test_a_design_by_the_name_of_its_surface_is_that_of_its_nodes() -> None:
 
 def test_a_design_by_name_says_what_its_surface_needs() -> None:
     contact = ContactProblem(scene(), MPI.COMM_SELF, partitions=partitions(scene()))
-    with pytest.raises(InvalidInputError, match=r"a rectangular grid .* got 'front' of a mesh with \['x0', "):
+    with pytest.raises(InvalidInputError, match=r"a rectangular grid .* got 'front' of \['x0', "):
         ShapeProblem(contact, SurfaceDesign("lower", "front"), TotalPotential())
     with pytest.raises(
         InvalidInputError, match=r"a net of \(7, 7\) control points needs at least as many nodes"

@@ -179,5 +179,7 @@ class Creeping(HistoryMaterial):
 
 
 def test_a_duration_that_is_not_known_is_asked_for() -> None:
-    with pytest.raises(InvalidInputError, match=r"the answer of Creeping depends on the duration.*: give it"):
+    with pytest.raises(
+        InvalidInputError, match=r"Creeping needs the duration of the step, got none: give one"
+    ):
         Creeping().answer(np.zeros((1, 3, 3)), np.zeros((1, 1)), np.nan)

@@ -117,7 +117,7 @@ def test_what_is_no_set_of_nodes_or_force_on_one_is_refused() -> None:
         InvalidInputError, match=r"node set 'a' must hold one or more .* got an array of shape"
     ):
         replace(BAR, node_sets={"a": [1, 1]})
-    with pytest.raises(InvalidInputError, match=r"'x0' must .* a name of its own, got the name of a"):
+    with pytest.raises(InvalidInputError, match=r"'x0' must .* its own name, got the name of a"):
         replace(BAR, node_sets={"x0": [1]})
     with pytest.raises(InvalidInputError, match=r"node set 'a' must number nodes 0 to 35, got 99 to 99"):
         replace(BAR, node_sets={"a": [99]})

@@ -124,7 +124,7 @@ def test_cells_without_centres_are_refused_and_complete_ones_stay() -> None:
     assert completed(ten) is ten
     box = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (1, 1, 1))))
     assert not completed(box).centres
-    with pytest.raises(InvalidInputError, match=r"must lie where these say, node \d+ does not by 0\.1"):
+    with pytest.raises(InvalidInputError, match=r"centre node \d+ is 0\.1 away"):
         BodyMesh(box.points + 0.1 * np.eye(27)[26][:, None], box.cells, centres=box.centres)
 
 

@@ -183,7 +183,7 @@ def test_half_of_a_symmetric_body_moves_as_the_whole() -> None:
     assert np.abs(first.rotation).max() > 0.01
     free = replace(half, supports=[*supports[:2], replace(end, rotation=(0, None, None))])
     with pytest.raises(
-        InvalidInputError, match=r"'x1' of body 'bar' meets another support at 4 nodes, which ho"
+        InvalidInputError, match=r"'x1' of body 'bar' meets another support at 4 nodes: prescribe the same"
     ):
         solved(free, COMM)
 

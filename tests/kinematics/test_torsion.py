@@ -576,7 +576,10 @@ def fit() -> Scene:
             "designs need bodies without torsion",
         ),
         (lambda: Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), STEEL, torsion=True), "body of revolution"),
-        (lambda: solved(fit()).reactions()[0].torque((0, 0, 0), (0, 0, 1)), "of bodies of revolution"),
+        (
+            lambda: solved(fit()).reactions()[0].torque((0, 0, 0), (0, 0, 1)),
+            "use moment_about.* bodies of revolution",
+        ),
     ],
 )
 def test_mistakes_are_named(make: Callable[[], object], words: str) -> None:

@@ -206,8 +206,8 @@ MUTATIONS = (
     Mutation(
         "supports that meet have equal parts of the reaction",
         "results/forces.py",
-        "own[:, None] * components",
-        "(own > 0)[:, None] * components",
+        "own[:, None] * support.holds",
+        "(own > 0)[:, None] * support.holds",
         ("tests/results/test_resultants.py::test_supports_that_share_nodes_share_their_reaction",),
     ),
     Mutation(
