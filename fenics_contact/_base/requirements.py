@@ -280,7 +280,8 @@ def check_compiler() -> None:
     problem = compiler_problem()
     if problem:
         raise MissingRequirementError(
-            f"forms need a C compiler and Python's headers: {problem}. {_APT} gcc python3-dev",
+            f"forms need a C compiler and Python's headers, found: {problem}. Debian: {_APT} gcc libc6-dev "
+            "python3-dev; conda-forge: conda install -c conda-forge c-compiler",
             name="compiler",
         )
 

@@ -362,7 +362,7 @@ def test_a_c_compiler_that_does_not_work_is_named(
 
 def test_missing_headers_of_python_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(sysconfig, "get_paths", lambda: {"include": str(tmp_path)})
-    with pytest.raises(MissingRequirementError, match=r"headers: .*Python\.h.*python3-dev"):
+    with pytest.raises(MissingRequirementError, match=r"headers, found: .*Python\.h.*python3-dev"):
         _requirements.check_compiler()
 
 
