@@ -132,7 +132,7 @@ def test_nodes_of_plane_elements_are_held_in_the_plane(
 ) -> None:
     text = _plate(axes, held)
     line = 1 + text.splitlines().index(f"BAR_X0, {held}")
-    with pytest.raises(DeckError, match=rf"line {line}\D.*\*BOUNDARY: axis {message}"):
+    with pytest.raises(DeckError, match=rf"line {line}\D.*\*BOUNDARY: \*TRANSFORM axis {message}"):
         read_deck(deck(tmp_path, text + step("*DLOAD\nBAR, P1, 1.\n")))
 
 
