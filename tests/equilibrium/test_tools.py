@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -136,6 +137,25 @@ def test_a_spring_takes_what_the_block_leaves() -> None:
     # It is the tool that a force less that of the spring drives.
     other = solved(pressed(ToolMotion("left", DOWN, STRAIGHT, (0, 0, -tool.force[2]))))
     assert other.tools()["left"].displacement[2] == pytest.approx(tool.displacement[2], rel=1e-6)
+
+
+def test_contact_on_a_surface_with_the_name_of_a_tool_is_not_contact_on_the_tool() -> None:
+    alone, name = pressed(ToolMotion("left", (0.0, 0.0, -0.02), STRAIGHT)), "left"
+    lower, upper = block((8, 0, 0), (9, 1, 1), (2, 2, 2)), block((8, 0, 1), (9, 1, 2), (2, 2, 2))
+    lower = replace(lower, surfaces={**lower.surfaces, name: lower.surfaces["z1"]})
+    scene = replace(
+        alone,
+        bodies={
+            **{each: alone.bodies[each] for each in alone.deforming},
+            "lower": Body(lower, SOFT),
+            "upper": Body(upper, SOFT),
+        },
+        supports=[*alone.supports, Support("lower", "z0"), Support("upper", "z1", (0, 0, -0.01))],
+        contacts=[*alone.contacts, ContactPair(Surface("upper", "z0"), Surface("lower", name))],
+    )
+    one, both = solved(alone).tools()[name], solved(scene).tools()[name]
+    assert abs(one.force[2]) > 1e-3
+    np.testing.assert_allclose(both.force, one.force, rtol=1e-6, atol=1e-9)
 
 
 def test_a_spring_holds_a_tool_that_nothing_touches() -> None:
