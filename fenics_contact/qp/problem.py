@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol, TypeAlias, runtime_checkable
 
@@ -137,7 +137,7 @@ class DualProblem:
     diagonal: Vector
     preconditioner: Operator | None = None
     scaling: Scaling | Unscaled = Unscaled()
-    reach: Callable[[Vector, Vector], Vector] = unknown_reach
+    reach: Callable[[Vector, Vector], Vector] = field(default_factory=lambda: unknown_reach)  # no method
     supported: Marks | bool = False
     friction: SlipLaw | None = None
     compliance: ContactLaw = EXACT
