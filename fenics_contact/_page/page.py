@@ -260,7 +260,7 @@ def _side(side: Any) -> str:
 
 def _plane(record: Record) -> bool:
     scene = record.get("scene") or {}
-    return scene.get("dimension") == 2 and not scene.get("axisymmetric")
+    return scene.get("dimension") == 2 and not (scene.get("axisymmetric") or scene.get("thickness"))
 
 
 def _steps(record: Record, units: Units) -> str:

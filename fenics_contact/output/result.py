@@ -65,6 +65,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
     return {
         "dimension": scene.dim,
         **scene.kinematics.record,
+        **({"thickness": True} if scene.has_thickness else {}),
         "bodies": {name: _body(body, subdomains[name]) for name, body in scene.deforming.items()},
         "supports": readable(scene.supports),
         "loads": readable(scene.loads),
@@ -232,8 +233,8 @@ FORMAT_VERSION = 1
 UNITS = (
     "those of the input: a scene in N and mm has forces in N, stresses, moduli and pressures in N/mm², "
     "energies and moments in N mm; seconds are wall time of rank 0; residuals and errors are relative; "
-    "plane bodies have forces, moments and energies a unit of thickness, bodies of revolution those of a "
-    "full revolution"
+    "plane bodies without a thickness have forces, moments and energies a unit of it, bodies of revolution "
+    "those of a full revolution"
 )
 
 

@@ -338,7 +338,7 @@ def draw_traction(
     """
     (clim, reach), rubs = window, trace.rubs
     facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
-    unit = f"{units.force} per revolution" if trace.revolved else f"{units.force}/{units.length}"
+    unit = units.force + trace.per.format(length=units.length)
     facts += trace.normal_forces.in_words(unit, written)
     if rubs:
         shear = trace.shear if abs(trace.shear) > ROUNDING * trace.normal_forces.sum else 0.0

@@ -12,7 +12,9 @@ from fenics_contact._base.checks import GivenVector, naming_arguments, unit_vect
 from fenics_contact._scene.pair_geometry import modulus_of
 from fenics_contact._scene.pairs import pair_number
 from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.thickness import thickness_on
 from fenics_contact._surfaces.facets import filled_at_corners, nodal_areas
+from fenics_contact.materials.elastic import thickness_of
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.results.contact import Status
 from fenics_contact.results.state import State
@@ -22,7 +24,7 @@ from fenics_contact.results.state import State
 def contact_area(state: State, pair: int | str = 0) -> float:
     """Return the area in which the surfaces of a pair touch, in the plane the length, [length²] or [length].
 
-    On bodies of revolution it is that all around the axis.
+    On bodies of revolution it is that all around the axis, on plane ones with a thickness that of all of it.
 
     It is measured on the slave, on the deformed one where its material is made for large deformations.
     Its rim runs between closed and open nodes and is located by pressure and gap: at a distance d inside the
@@ -77,7 +79,7 @@ def _area(state: State, surface: _SlaveSurface) -> float:
         size = size * facing[facets].mean(axis=1)
         size = size * measure.around_closed(surface.places[facets, 0], surface.closed[facets], share)
         total += weight * float(size @ share)
-    return total
+    return surface.thickness * total
 
 
 @naming_arguments
@@ -117,7 +119,8 @@ class _SlaveSurface:
     `places`: its nodes, deformed if its body deforms much; `pressure`: of closed nodes, zero at open ones;
     `spread`: E* times the gap of open nodes; `facing`: share of each node's area that faces the master, zero
     at nodes without a contact point; `given`: marks of nodes whose area is among those of their neighbours;
-    `beyond`: how far contact reaches on the way to nodes without a contact point, relative to the distance.
+    `beyond`: how far contact reaches on the way to nodes without a contact point, relative to the distance;
+    `thickness`: that of a plane body, one without.
     """
 
     places: np.ndarray
@@ -127,6 +130,7 @@ class _SlaveSurface:
     facing: np.ndarray
     given: np.ndarray
     beyond: float
+    thickness: float
 
     @cached_property
     def closed(self) -> np.ndarray:
@@ -203,10 +207,11 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
     given = held & by_mortar
     facing = held.astype(float)
     facing[place] = 1.0
+    thickness = thickness_on(scene.bodies[slave.body], slave.name, "the slave")
     if by_mortar:
         areas = nodal_areas(surface.points, surface.facets, scene.kinematics.measure).ravel()
         of_nodes = fill.T @ np.bincount(surface.facets.ravel(), areas)
-        whole_area = np.bincount(point, of_nodes[place], points.count)
+        whole_area = thickness * np.bincount(point, of_nodes[place], points.count)
         facing[place] = contact.nominal_area[point] / whole_area[point]
     facing = fill @ facing
     if not by_mortar:
@@ -214,7 +219,7 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
     if scene.axisymmetric and not by_mortar:
         facing = np.clip(scene.kinematics.measure.filled(whole, facing, on_axis), 0.0, 1.0)
     facets, beyond = surface.facets[:, : surface.corners], 0.0 if by_mortar else 0.5
-    return _SlaveSurface(places, facets, pressure, spread, facing, given, beyond)
+    return _SlaveSurface(places, facets, pressure, spread, facing, given, beyond, thickness)
 
 
 def _modulus(state: State, pair: int) -> float:
@@ -235,6 +240,7 @@ def _modulus(state: State, pair: int) -> float:
             return float("nan")
         dim = scene.dim
         own = moduli(forms, body.materials[0], body.element)[:: dim + 1, :: dim + 1]
+        own = own / (thickness_of(body.materials[0]) or 1.0)
         along = np.trace(own) / dim
         across = (own.sum() - np.trace(own)) / (dim * (dim - 1))
         compliance += along / (along**2 - across**2)

@@ -228,7 +228,7 @@ def test_slip_at_both_ends_of_a_surface_alone_is_drawn(tmp_path: Path) -> None:
     assert set(places[state.contact.status == Status.SLIP].round(9)) == {20.0, 40.0}
     assert contains(pixels(plot_contact_pressure(state, tmp_path / "hub.png", width=SMALL)), "#d55e00")
     trace = contact_trace(state, 0)
-    assert (trace.axis.strip("−"), trace.revolved) == ("z", True)
+    assert (trace.axis.strip("−"), trace.per) == ("z", " per revolution")
 
 
 def test_plane_subdomains_have_colours_of_their_own(tmp_path: Path) -> None:

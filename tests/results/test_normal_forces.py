@@ -18,6 +18,8 @@ from fenics_contact import (
     Scene,
     Support,
     Surface,
+    Traction,
+    contact_area,
     result_page,
     solve_scene,
     write_result,
@@ -29,6 +31,7 @@ from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.output import StepTable, read_result
 from fenics_contact.output.tables import step_row
 from fenics_contact.pictures import plot_contact_pressure
+from fenics_contact.pictures.curves import contact_trace
 from fenics_contact.results.contact import NormalForces
 from fenics_contact.results.state import State, pairs_in_words
 
@@ -72,6 +75,28 @@ def test_around_an_axis_radial_forces_have_no_resultant() -> None:
     forces = solve_scene(turned(), MPI.COMM_SELF).contact.normal_forces()
     assert forces.sum == pytest.approx(SHRUNK * 2 * np.pi * INNER * 5.0, rel=0.01)
     assert forces.resultant == 0.0
+
+
+@pytest.mark.parametrize("by", ["node", "mortar"])
+def test_a_thickness_multiplies_forces_and_areas_and_changes_their_units(by: str, tmp_path: Path) -> None:
+    found = []
+    steels = PlaneStrain(E, NU), PlaneStrain(E, NU, thickness=3.0)
+    for given, steel in enumerate(steels):
+        lower, upper = rectangle((0.0, 0.0), (7.0, 2.0), (21, 6)), rectangle((2.0, 2.0), (5.0, 4.0), (9, 6))
+        pair = ContactPair(Surface("upper", "y0"), Surface("lower", "y1"), discretisation=by)  # type: ignore[arg-type]
+        bend = Traction("upper", "y1", lambda x: np.stack([0 * x[:, 0], 300.0 - 260.0 * (x[:, 0] - 2.0)], 1))
+        bodies, sides = {"lower": Body(lower, steel), "upper": Body(upper, steel)}, ("x0", "x1")
+        held = [Support("lower", "y0"), *(Support("upper", side, (0.0, None)) for side in sides)]
+        state = solve_scene(Scene(bodies, held, [bend], [pair]), MPI.COMM_SELF, tolerance=1e-10)
+        write_result(state, folder := tmp_path / str(len(found)))
+        (written,) = read_result(folder)["contact"]
+        assert written["area"] == contact_area(state)
+        assert bool(re.search(r"N/mm(?!²)", result_page(state).html or "")) is not bool(given)
+        assert contact_trace(state, 0).per == ("" if given else "/{length}")
+        found.append([contact_area(state), state.contact.normal_forces().sum])
+    (area, force), thick = found
+    assert 0.0 < area < 3.0
+    assert thick == pytest.approx([3.0 * area, 3.0 * force], rel=1e-6)
 
 
 @pytest.mark.parametrize("thickness", [1.0, 2.0])
