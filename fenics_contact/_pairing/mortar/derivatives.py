@@ -258,13 +258,24 @@ def mortar_pulled_back(
     with together(comm):
         if len(part):
             _add_integrals(slave, moved_aside(master), part, sums, into)
-    by_slave, by_master = (side.summed(comm) for side in into)
+    sides = into[0].summed(comm), into[1].summed(comm)
+    add_normals(sides, turned, coupling, by)
+    return sides
+
+
+def add_normals(
+    sides: tuple[SurfaceDerivatives, SurfaceDerivatives],
+    turned: NormalsPulledBack,
+    coupling: MortarCoupling,
+    by: CouplingDerivatives,
+) -> None:
+    """Add those by the normals of points, and by gaps along them, to derivatives by slave and master."""
+    by_slave, by_master = sides
     along = by.gap[:, None] * coupling.normal
     by_slave.normals[coupling.node] += turned.slave
     by_master.normals[:] += turned.master
-    by_slave.points[:] += coupling.of_slave_pulled_back(along, len(slave.nodes))
+    by_slave.points[:] += coupling.of_slave_pulled_back(along, len(by_slave.points))
     by_master.points[:] -= coupling.weight.T @ along
-    return by_slave, by_master
 
 
 def moved_aside(master: FacetedSurface, beside: float = 1e-9) -> FacetedSurface:

@@ -23,7 +23,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar.by_master import NormalsPulledBack, with_inclined
 from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
-from fenics_contact._pairing.mortar.derivatives import SurfaceDerivatives, mortar_pulled_back
+from fenics_contact._pairing.mortar.derivatives import SurfaceDerivatives, add_normals, mortar_pulled_back
 from fenics_contact._pairing.mortar.gathering import CondensedDualBasis
 from fenics_contact._pairing.projection import shared_projection
 from fenics_contact._surfaces.facets import FacetedSurface
@@ -199,10 +199,6 @@ class MortarPoints:
         turned = NormalsPulledBack.of(slave, master, coupling, by)
         whole, places = gathering.whole, (slave.points, master.points)
         by_whole = gathering.pulled_back(coupling, turned.with_weights(by, master), places)
-        by_slave, by_master = mortar_pulled_back(slave, master, whole, by_whole, comm)
-        along = by.gap[:, None] * coupling.normal
-        by_slave.normals[coupling.node] += turned.slave
-        by_master.normals[:] += turned.master
-        by_slave.points[:] += coupling.of_slave_pulled_back(along, len(slave.nodes))
-        by_master.points[:] -= coupling.weight.T @ along
-        return by_slave, by_master
+        sides = mortar_pulled_back(slave, master, whole, by_whole, comm)
+        add_normals(sides, turned, coupling, by)
+        return sides
