@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 __all__ = [
-    "Table", "counted", "displayed", "force_units", "in_lines", "in_notebooks", "in_short", "name_in_words",
+    "DerivedUnits", "Table", "counted", "displayed", "in_lines", "in_notebooks", "in_short", "name_in_words",
     "tabled",
 ]  # fmt: skip
 
@@ -245,10 +245,26 @@ def counted(number: int, one: str, many: str = "") -> str:
     return f"{number} {one if number == 1 else many or one + 's'}"
 
 
-def force_units(force: str, length: str, per_thickness: bool) -> tuple[str, str]:
-    """Return the units of forces, and of moments and energies; those of plane bodies are per thickness."""
-    per = f"/{length}" if per_thickness else ""
-    return f"{force}{per}", f"{force} {length}{per}"
+@dataclass(frozen=True)
+class DerivedUnits:
+    """Names of units of forces, of moments and energies, and of areas of surfaces.
+
+    `per`: what follows behind them, " per revolution" of bodies of revolution.
+    """
+
+    force: str
+    moment: str
+    area: str
+    per: str
+
+    @classmethod
+    def of(cls, force: str, length: str, scene: Mapping[str, Any]) -> DerivedUnits:
+        """Return them by what a scene records; what plane bodies without a thickness have is per length."""
+        turned = bool(scene.get("axisymmetric"))
+        plane = scene.get("dimension") == 2 and not turned and not scene.get("thickness")
+        each = f"/{length}" if plane else ""
+        area, per = length if plane else f"{length}²", " per revolution" if turned else ""
+        return cls(f"{force}{each}", f"{force} {length}{each}", area, per)
 
 
 def name_in_words(name: str) -> str:

@@ -21,7 +21,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from fenics_contact._base.display import COLUMNS, counted, force_units
+from fenics_contact._base.display import COLUMNS, DerivedUnits, counted
 from fenics_contact._base.progress import at_terminal, visible
 from fenics_contact._base.sparse import rounded
 from fenics_contact._scene_file.reading import SceneFile
@@ -224,16 +224,14 @@ def report_error(error: BaseException, comm: MPI.Comm) -> ExitCode:
     return code
 
 
-def forces_table(forces: Mapping[str, Any], units: Mapping[str, str] | None = None) -> Table:
+def forces_table(forces: Mapping[str, Any], units: DerivedUnits) -> Table:
     """Return forces and moments of a result file, one row each."""
-    balance, names = forces["balance"], units or {}
-    force, length = names.get("force", "force"), names.get("length", "length")
+    balance = forces["balance"]
     moments = np.shape(balance["loads"]["moment"])
     plane, turned, twists = moments == (), moments in ((0,), (1,)), moments == (1,)
-    force, moment = force_units(force, length, plane)
-    kinds = f"forces ({force}) and moments ({moment})"
+    kinds = f"forces ({units.force}) and moments ({units.moment})"
     if turned:
-        kinds = f"forces ({force}){f' and torques ({moment})' * twists} per revolution"
+        kinds = f"forces ({units.force}){f' and torques ({units.moment})' * twists}{units.per}"
     table = Table(
         title=kinds,
         title_justify="left",
@@ -266,7 +264,8 @@ def _place(point: Any) -> str:
 
 def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     """Return a summary of a state as text, without energies that are not known. Collective."""
-    counts, (force, energy) = state.counts, force_units(units.force, units.length, state.scene.is_plane)
+    names = DerivedUnits.of(units.force, units.length, state.scene.dimension_record)
+    counts, force, energy = state.counts, names.force, names.moment
     rows = {
         "unknowns": f"{counts['torn_unknowns']} in {counted(counts['subdomains'], 'subdomain')}",
         "work": f"{counted(counts['solver_steps'], 'step')}, "
@@ -296,7 +295,7 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
 def step_table(rows: Sequence[Mapping[str, Any]], file: SceneFile) -> Table:
     """Return one row for every load step."""
     units = file.document.units
-    force, _ = force_units(units.force, units.length, file.scene.is_plane)
+    force = DerivedUnits.of(units.force, units.length, file.scene.dimension_record).force
     table = Table(
         title=f"{file.title}: load steps", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
     )

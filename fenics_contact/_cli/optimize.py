@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from fenics_contact._adaptive.minimised import AccurateDesign
-from fenics_contact._base.display import force_units
+from fenics_contact._base.display import DerivedUnits
 from fenics_contact._cli.console import Console, ExitCode, facts
 from fenics_contact._cli.options import checkpoint_of, forget, resumable, scene_command
 from fenics_contact._cli.run import table_of_levels
@@ -198,7 +198,7 @@ def _facts(file: SceneFile, task: ShapeTask, done: _Done) -> dict[str, str]:
         rows[f"constraint {one.name}"] = f"{one.value:.6g}{', active' if one.active else ''}"
     for name, point in (("before", before), ("after", after)):
         state = point.state
-        force, _ = force_units(units.force, units.length, state.scene.is_plane)
+        force = DerivedUnits.of(units.force, units.length, state.scene.dimension_record).force
         for number, words in enumerate(pairs_in_words(state.scene, state.contact, force, units.stress)):
             rows[f"contact {number} {name}"] = words
     volume, start = problem.volume(result.x)[0], problem.volume(task.start)[0]

@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from fenics_contact._adaptive.levels import AccurateResult, Level
+from fenics_contact._base.display import DerivedUnits
 from fenics_contact._cli.console import (
     Console,
     ExitCode,
@@ -136,7 +137,9 @@ def _show(console: Console, file: SceneFile, state: State, title: str = "") -> N
     """Print what was found, and forces and moments. Collective."""
     console.write(facts(state_facts(state, file.document.units), title))
     console.write()
-    console.write(forces_table(forces_record(state), file.document.units.model_dump()))
+    names = file.document.units
+    units = DerivedUnits.of(names.force, names.length, state.scene.dimension_record)
+    console.write(forces_table(forces_record(state), units))
 
 
 def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> dict[str, State]:

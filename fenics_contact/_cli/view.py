@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from fenics_contact._base.display import DerivedUnits
 from fenics_contact._base.requirements import require_extra
 from fenics_contact._cli.console import Console, console_of, facts, forces_table
 from fenics_contact._scene.scene import Scene
@@ -265,7 +266,9 @@ def show_record(console: Console, record: dict[str, Any]) -> None:
         else:
             console.write(facts({name: value}))
     if record.get("forces"):
-        console.write(forces_table(record["forces"], record.get("more", {}).get("unit_names")))
+        names = {"force": "force", "length": "length", **record.get("more", {}).get("unit_names", {})}
+        units = DerivedUnits.of(names["force"], names["length"], record.get("scene", {}))
+        console.write(forces_table(record["forces"], units))
 
 
 def evaluations(history: dict[str, list[Any]]) -> Table:

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.colors import Colormap, to_hex
 
 from fenics_contact._base.checks import naming_arguments
-from fenics_contact._base.display import force_units, name_in_words
+from fenics_contact._base.display import DerivedUnits, name_in_words
 from fenics_contact._base.requirements import require_extra
 from fenics_contact._page.arrays import Arrays
 from fenics_contact._page.obstacles import obstacle_entries
@@ -169,7 +169,7 @@ def _rows(facts: Mapping[str, Any]) -> str:
 
 def _summary(record: Record, units: Units) -> dict[str, Any]:
     scene, counts, solver = (record.get(name) or {} for name in ("scene", "counts", "solver"))
-    energies, (_, work) = record.get("energies") or {}, _force_units(record, units)
+    energies, work = record.get("energies") or {}, _derived_units(record, units).moment
     facts: dict[str, Any] = {
         f"body {name}": f"{number(body['cells'])} cells ({body['cell_type']}), {number(body['nodes'])} nodes"
         for name, body in (scene.get("bodies") or {}).items()
@@ -194,9 +194,8 @@ def _tolerance(given: Any) -> Any:
     return f"solver's error at most {100 * given['share']:.3g} % of the discretisation's"
 
 
-def _force_units(record: Record, units: Units) -> tuple[str, str]:
-    """Return the units of forces, and of moments and energies."""
-    return force_units(units.force, units.length, _plane(record))
+def _derived_units(record: Record, units: Units) -> DerivedUnits:
+    return DerivedUnits.of(units.force, units.length, record.get("scene") or {})
 
 
 def _accuracy(record: Record) -> dict[str, Any]:
@@ -214,7 +213,7 @@ def _accuracy(record: Record) -> dict[str, Any]:
 
 
 def _contact(record: Record, units: Units) -> str:
-    entries, (force, _) = record.get("contact") or [], _force_units(record, units)
+    entries, derived = record.get("contact") or [], _derived_units(record, units)
     names = (record.get("scene") or {}).get("contacts") or [{}] * len(entries)
     rows: list[tuple[str, str]] = []
     for pair, entry in zip(names, entries, strict=True):
@@ -225,11 +224,11 @@ def _contact(record: Record, units: Units) -> str:
         rows += [
             (words, f"{number(entry[name])} {unit}")
             for name, words, unit in (
-                ("normal_force", "sum of normal forces", force),
-                ("normal_resultant", "their resultant", force),
+                ("normal_force", "sum of normal forces", derived.force),
+                ("normal_resultant", "their resultant", derived.force),
                 ("peak_pressure", "largest pressure", units.stress),
                 ("peak_nominal_pressure", "largest nominal pressure", units.stress),
-                ("area", "area in contact", units.length if _plane(record) else f"{units.length}²"),
+                ("area", "area in contact", derived.area),
                 ("smallest_gap", "smallest gap", units.length),
                 ("largest_slip", "largest slip of the last step", units.length),
             )
@@ -258,16 +257,11 @@ def _side(side: Any) -> str:
     return name_in_words(str(side.get("type", "obstacle")))
 
 
-def _plane(record: Record) -> bool:
-    scene = record.get("scene") or {}
-    return scene.get("dimension") == 2 and not (scene.get("axisymmetric") or scene.get("thickness"))
-
-
 def _steps(record: Record, units: Units) -> str:
     steps = (record.get("more") or {}).get("steps")
     if not isinstance(steps, Mapping) or "name" not in steps:
         return ""
-    force, _ = _force_units(record, units)
+    force = _derived_units(record, units).force
     named = {
         "number": "", "name": "step", "iterations": "iterations", "products": "products", "open": "open",
         "stick": "stick", "slip": "slip", "normal_force": f"sum of normal forces ({force})",
@@ -298,7 +292,7 @@ def _springs(record: Record, units: Units) -> dict[str, str]:
     facts: dict[str, str] = {}
     for entry in (record.get("forces") or {}).get("springs") or ():
         tension, longer = (", ".join(map(number, entry[name])) for name in ("tension", "elongation"))
-        force, _ = _force_units(record, units)
+        force = _derived_units(record, units).force
         facts[entry["name"]] = f"tension {tension} {force}; elongation {longer} {units.length}"
     return facts
 
@@ -307,7 +301,7 @@ def _constraints(record: Record, units: Units) -> dict[str, str]:
     """Return the forces of linear constraints on bodies."""
     facts: dict[str, str] = {}
     for entry in (record.get("forces") or {}).get("constraints") or ():
-        force, _ = _force_units(record, units)
+        force = _derived_units(record, units).force
         on = [f"{each['body']} {', '.join(map(number, each['force']))} {force}" for each in entry["bodies"]]
         facts[entry["name"]] = f"{entry['equations']} equations; force on {'; '.join(on)}"
     return facts
@@ -319,7 +313,7 @@ def _forces(record: Record, units: Units) -> str:
     if not forces:
         return ""
     scales, imbalance = scales_of(forces), forces["balance"]["imbalance"]
-    names = _force_units(record, units)
+    names = _derived_units(record, units)
     entries = [
         (f"{what} {_side(entry)}" if "surface" in entry else what, entry)
         for what, entry in listed_forces(forces)
@@ -328,13 +322,13 @@ def _forces(record: Record, units: Units) -> str:
     turned = bool((record.get("scene") or {}).get("axisymmetric"))
     twists = bool((record.get("scene") or {}).get("torsion"))
     around = "axial forces and torques" if twists else "axial forces"
-    what = f"{around} per revolution" if turned else "forces and moments"
+    what = f"{around}{names.per}" if turned else "forces and moments"
     words = f"<p>Imbalance of all {what}: {escape(number(imbalance))}.</p>"
     return _table(("", "", *(("r", "z", "") if turned else "xyz")), rows, words=2) + words
 
 
 def _force_rows(
-    name: str, entry: Record, given: Mapping[str, float], units: tuple[str, str], rounding: float = 1e-8
+    name: str, entry: Record, given: Mapping[str, float], units: DerivedUnits, rounding: float = 1e-8
 ) -> list[tuple[Any, ...]]:
     """Return a row for a force and one for its moment; none if both are zero but for rounding."""
     scales = {**given, "about": given["moment"] / given["force"] if given["force"] else 0.0}
@@ -345,18 +339,18 @@ def _force_rows(
     if not any([*force, *moment]):
         return []
     if not moment:  # all around an axis
-        return [(name, f"radial and axial force ({units[0]})", *force, "")]
+        return [(name, f"radial and axial force ({units.force})", *force, "")]
     if isinstance(entry["moment"], list) and len(moment) == 1:  # of bodies of revolution that may twist
         return [
-            (name, f"radial and axial force ({units[0]})", *force, ""),
-            ("about the axis", f"torque ({units[1]})", "", "", *moment),
+            (name, f"radial and axial force ({units.force})", *force, ""),
+            ("about the axis", f"torque ({units.moment})", "", "", *moment),
         ]
     # In the plane a moment is one number, about the axis across it.
     return [
-        (name, f"force ({units[0]})", *force, *[""] * (3 - len(force))),
+        (name, f"force ({units.force})", *force, *[""] * (3 - len(force))),
         (
             f"about {', '.join(map(number, about))}",
-            f"moment ({units[1]})",
+            f"moment ({units.moment})",
             *[""] * (3 - len(moment)),
             *moment,
         ),

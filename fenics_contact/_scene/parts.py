@@ -6,7 +6,7 @@ import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -161,9 +161,10 @@ class SceneParts:
         return next(iter(self.bodies.values())).axisymmetric
 
     @property
-    def is_plane(self) -> bool:
-        """Whether its bodies are plane, with forces a unit of thickness; with a thickness they are not."""
-        return self.dim == 2 and not self.axisymmetric and not self.has_thickness
+    def dimension_record(self) -> dict[str, Any]:
+        """What files of results say of its space: dimension, revolution, torsion, thickness."""
+        thickness = {"thickness": True} if self.has_thickness else {}
+        return {"dimension": self.dim, **self.kinematics.record, **thickness}
 
     @property
     def has_thickness(self) -> bool:

@@ -63,9 +63,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
     See `fenics_contact.write_result`. Functions are given by their names, numbers by their values.
     """
     return {
-        "dimension": scene.dim,
-        **scene.kinematics.record,
-        **({"thickness": True} if scene.has_thickness else {}),
+        **scene.dimension_record,
         "bodies": {name: _body(body, subdomains[name]) for name, body in scene.deforming.items()},
         "supports": readable(scene.supports),
         "loads": readable(scene.loads),

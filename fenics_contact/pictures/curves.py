@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -133,8 +133,8 @@ class ContactTrace:
     `pressure`: on all nodes, zero where there is no contact point; `traction`: tangential traction on the
     slave in the direction of increasing positions; with torsion its size; `slip`: slip of the contact points
     on the master in the last load step, in the direction of increasing positions, with torsion its size;
-    `shear`: resultant of the traction, with torsion its torque about the axis; `per`: what follows the unit
-    of forces: "/{length}" in the plane, " per revolution", nothing where bodies have a thickness.
+    `shear`: resultant of the traction, with torsion its torque about the axis; `space`: the dimension that
+    the scene records, which gives forces their unit.
     """
 
     name: str
@@ -150,7 +150,7 @@ class ContactTrace:
     normal_forces: NormalForces
     shear: float
     rubs: bool
-    per: str
+    space: Mapping[str, Any]
     twists: bool = False
 
     def broken(self, values: np.ndarray) -> np.ndarray:
@@ -184,9 +184,8 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
         lengths = np.diff([*starts, len(order)])
         order, starts = order[::-1], np.concatenate([[0], np.cumsum(lengths[::-1])[:-1]])
     axis, places = _unrolled(mesh.points[order], starts)
-    per = "/{length}" if state.scene.is_plane else ""
     if state.scene.axisymmetric:
-        per, axis = " per revolution", axis.replace("x", "r").replace("y", "z")
+        axis = axis.replace("x", "r").replace("y", "z")
     numbers = state.torn.decomposition.tearing.global_nodes(slave.body, order)
     chosen = contact.on_pair(pair)
     sorting = np.argsort(numbers)
@@ -205,7 +204,7 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
         f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],
         points, contact.status[chosen], slip,
         contact.normal_forces(pair), float(shear),
-        state.scene.contacts[pair].has_friction, per, state.scene.torsion,
+        state.scene.contacts[pair].has_friction, state.scene.dimension_record, state.scene.torsion,
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from fenics_contact._base.display import DerivedUnits
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.pairs import pair_number
 from fenics_contact._surfaces.facets import filled_at_corners
@@ -338,14 +339,14 @@ def draw_traction(
     """
     (clim, reach), rubs = window, trace.rubs
     facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
-    unit = units.force + trace.per.format(length=units.length)
-    facts += trace.normal_forces.in_words(unit, written)
+    names = DerivedUnits.of(units.force, units.length, trace.space)
+    facts += trace.normal_forces.in_words(names.force + names.per, written)
     if rubs:
         shear = trace.shear if abs(trace.shear) > ROUNDING * trace.normal_forces.sum else 0.0
-        what = "tangential force"
-        if trace.twists:
-            what, unit = "torque of friction", unit.replace(units.force, f"{units.force} {units.length}", 1)
-        facts += f", {what} {written(shear)} {unit}"
+        what, unit = (
+            ("torque of friction", names.moment) if trace.twists else ("tangential force", names.force)
+        )
+        facts += f", {what} {written(shear)} {unit}{names.per}"
     top = float(trace.pressure.max()) or 1.0
     height = round((0.62 if rubs else 0.4) * width)
     with sheet(paper, (width, height), headline(title, facts)) as figure:

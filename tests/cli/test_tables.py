@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fenics_contact._base.display import DerivedUnits
 from fenics_contact._cli.console import forces_table, state_facts
 from fenics_contact._scene_file.document import UnitNames
 from fenics_contact.output.result import forces_record
@@ -11,11 +12,12 @@ from tests.pictures.states import touching_blocks
 
 
 def test_forces_and_energies_have_the_units_of_their_dimension() -> None:
-    units = {"force": "N", "length": "mm"}
     for state, force, moment in (
         (flat_pad(), "N/mm", "N mm/mm"),
+        (flat_pad(thickness=2.0), "N", "N mm"),
         (touching_blocks(), "N", "N mm"),
     ):
+        units = DerivedUnits.of("N", "mm", state.scene.dimension_record)
         assert forces_table(forces_record(state), units).title == f"forces ({force}) and moments ({moment})"
         facts = state_facts(state, UnitNames())
         assert facts["strain energy"].endswith(f"{state.energies.strain:.6g} {moment}")

@@ -152,7 +152,7 @@ def test_the_contact_pressure_is_that_on_the_slave() -> None:
     np.testing.assert_allclose(state.contact.normal_force.sum(), 6.0, rtol=1e-8)
     np.testing.assert_allclose(state.contact.pressure, 6.0 / (2.0 * THIN), rtol=1e-7)
     np.testing.assert_allclose(state.gather_stress("low")[:, 1, 1], -6.0 / (2.0 * THICK), rtol=1e-7)
-    assert not state.scene.is_plane
+    assert state.scene.dimension_record == {"dimension": 2, "thickness": True}
     np.testing.assert_allclose(state.contact.points.sizes.sum(), 2.0, rtol=1e-12)
 
 

@@ -51,9 +51,9 @@ def plane_block(cell: str = "quadrilateral", friction: float = 0.4) -> State:
     return state
 
 
-def flat_pad(push: float = 0.01) -> State:
+def flat_pad(push: float = 0.01, thickness: float | None = None) -> State:
     """A pad three times as long as high, pressed on a floor and pushed along it."""
-    return _pad(6.0, 2.0, push)
+    return _pad(6.0, 2.0, push, thickness)
 
 
 def tall_pad() -> State:
@@ -61,11 +61,15 @@ def tall_pad() -> State:
     return _pad(2.0, 6.0, 0.01)
 
 
-@lru_cache(maxsize=3)
-def _pad(width: float, height: float, push: float) -> State:
+@lru_cache(maxsize=4)
+def _pad(width: float, height: float, push: float, thickness: float | None = None) -> State:
     cells = round(2 * width), round(2 * height)
     scene = Scene(
-        {"pad": Body(rectangle((0.0, 0.0), (width, height), cells), PlaneStrain(100.0, 0.3))},
+        {
+            "pad": Body(
+                rectangle((0.0, 0.0), (width, height), cells), PlaneStrain(100.0, 0.3, thickness=thickness)
+            )
+        },
         [Support("pad", "y1", (push, -0.02))],
         contacts=[ContactPair(Surface("pad", "y0"), FLOOR, Coulomb(0.3))],
     )

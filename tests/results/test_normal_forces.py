@@ -92,7 +92,7 @@ def test_a_thickness_multiplies_forces_and_areas_and_changes_their_units(by: str
         (written,) = read_result(folder)["contact"]
         assert written["area"] == contact_area(state)
         assert bool(re.search(r"N/mm(?!²)", result_page(state).html or "")) is not bool(given)
-        assert contact_trace(state, 0).per == ("" if given else "/{length}")
+        assert contact_trace(state, 0).space == state.scene.dimension_record
         found.append([contact_area(state), state.contact.normal_forces().sum])
     (area, force), thick = found
     assert 0.0 < area < 3.0
