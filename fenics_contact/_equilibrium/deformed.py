@@ -44,7 +44,7 @@ from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import nodal_mean_transposed, nodal_sum
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.torn import TornSystem, contacts_alike
-from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.qp.reductions import global_sum
 from fenics_contact.qp.solution import Solution
 from fenics_contact.results.contact import ContactResult
@@ -207,7 +207,7 @@ class DeformedEquilibria:
 
     def _require_later(self, scene: Scene, earlier: float, time: float) -> None:
         materials = [each for body in scene.bodies.values() for each in body.materials]
-        if time < earlier and any(isinstance(each, HistoryMaterial) for each in materials):
+        if time < earlier and any(has_history(each) for each in materials):
             raise InvalidInputError(
                 f"the time of load steps must not decrease where materials have a history, got {time:g} "
                 f"after {earlier:g}: give later times, or none"

@@ -29,7 +29,7 @@ from fenics_contact.materials.hyperelastic import (
     is_nonlinear,
     volume_change,
 )
-from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.materials.plastic import has_history
 
 
 class Fields(NamedTuple):
@@ -62,7 +62,7 @@ def prepare_forms(templates: Templates, materials: tuple[Material, ...], element
 
 def have_mean_energy(materials: tuple[Material, ...]) -> bool:
     """Return whether some material has an energy of the mean dilatation of each cell."""
-    return any(has_mean_dilatation(each) and not isinstance(each, HistoryMaterial) for each in materials)
+    return any(has_mean_dilatation(each) and not has_history(each) for each in materials)
 
 
 def _written(kind: str, materials: tuple[Material, ...], element: Element) -> Written:
@@ -83,7 +83,7 @@ def _written(kind: str, materials: tuple[Material, ...], element: Element) -> Wr
     density = (FORMS | MEAN_FORMS)[kind]
 
     def integrand(material: Material, constants: Constants) -> Expr | None:
-        if isinstance(material, HistoryMaterial):
+        if has_history(material):
             return None  # what it answers is added to the assembled forms
         if not heat_expands(material):
             return density(material, fields, constants)

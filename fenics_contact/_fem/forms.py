@@ -46,7 +46,7 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import together
 from fenics_contact.materials.elastic import Material, Transverse, can_expand
 from fenics_contact.materials.hyperelastic import Hyperelasticity, is_nonlinear
-from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.quality import cell_volumes
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ class FormLibrary:
             points = points - points[0]  # as exact far from the origin as near it
         if not any(map(is_nonlinear, parts.materials)):
             return LinearMechanics(self.stiffness(parts, element, space), space.mesh, points)
-        remembering = [isinstance(material, HistoryMaterial) for material in parts.materials]
+        remembering = [has_history(material) for material in parts.materials]
         if all(remembering):
             return HistoryMechanics(parts, element, space, points)
         others = HyperelasticMechanics(self._templates, parts, element, space, points)

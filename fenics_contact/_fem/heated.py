@@ -14,7 +14,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact.materials.elastic import can_expand
 from fenics_contact.materials.hyperelastic import is_nonlinear
-from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.materials.plastic import has_history
 
 if TYPE_CHECKING:
     from fenics_contact._kinematics.element import Element
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def heat_expands(material: Any) -> bool:
     """Return whether forms of a material have its thermal stretch: it has an energy and expands."""
-    return is_nonlinear(material) and can_expand(material) and not isinstance(material, HistoryMaterial)
+    return is_nonlinear(material) and can_expand(material) and not has_history(material)
 
 
 def thermal_split(stretch: Expr, displacement: Expr, *others: Expr) -> tuple[LiftedCoefficient, ...]:

@@ -30,7 +30,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import is_nonlinear
-from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.materials.plastic import HistoryMaterial, has_history
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature
 from fenics_contact.mesh.quality import determinants
 from fenics_contact.mesh.transfer import MeshTransfer
@@ -76,7 +76,7 @@ class History:
             degree = quadrature_degree(body.element)
             found = transfer.at_gauss_points(mesh, body.mesh, degree, values[name])
             for number, material in enumerate(body.materials):
-                if isinstance(material, HistoryMaterial):
+                if has_history(material):
                     size, mine = material.history_size, body.material_of_cells == number
                     kept = material.admissible(found[mine, :, :size].reshape(-1, size))
                     found[mine, :, :size] = kept.reshape(-1, found.shape[1], size)
@@ -86,7 +86,7 @@ class History:
 
 def history_size(body: Body) -> int:
     """Return the largest number of internal variables of a body's materials, 0 without any."""
-    return max((each.history_size for each in body.materials if isinstance(each, HistoryMaterial)), default=0)
+    return max((each.history_size for each in body.materials if has_history(each)), default=0)
 
 
 def _shape(body: Body) -> tuple[int, int, int]:
@@ -174,7 +174,7 @@ class HistoryMechanics:
         self._parts = [
             (material, parts.cells_of(tag, self._gauss.shape[0]))
             for tag, material in enumerate(parts.materials, start=1)
-            if isinstance(material, HistoryMaterial)
+            if has_history(material)
         ]
         self._size = max(material.history_size for material, _ in self._parts)
 
@@ -390,7 +390,7 @@ def prepare_mechanics(templates: Templates, scene: Scene) -> None:
     """Compile the missing forms of a scene's nonlinear materials. Collective."""
     for body in scene.bodies.values():
         for materials in material_sets(body):
-            others = [material for material in materials if not isinstance(material, HistoryMaterial)]
+            others = [material for material in materials if not has_history(material)]
             if others and any(map(is_nonlinear, materials)):
                 prepare_forms(templates, materials, body.element)
 

@@ -22,7 +22,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material, thickness_of
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain, is_nonlinear
-from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.mesh.collapsed import has_collapsed
@@ -291,7 +291,7 @@ def _check_symmetric_axes(material: Material, rounding: float = 1e-9) -> None:
 
 
 def _check_mean_dilatation(material: Material, mesh: BodyMesh) -> None:
-    if has_mean_dilatation(material) and isinstance(material, HistoryMaterial) and material.finite:
+    if has_mean_dilatation(material) and has_history(material) and material.finite:
         raise InvalidInputError(
             f"mean_dilatation of a material with a history needs small strain, {type(material).__name__} is "
             "for large ones: leave it out, and use quadratic cells, fenics_contact.mesh.quadratic"

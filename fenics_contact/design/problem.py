@@ -39,7 +39,7 @@ from fenics_contact.errors import (
 )
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.materials.hyperelastic import has_mean_dilatation
-from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.results.deformed_state import AnyState
 
@@ -115,7 +115,7 @@ def _check_differentiable(scene: Scene) -> None:
         return
     reasons = {
         "materials without history": any(
-            isinstance(each, HistoryMaterial) for body in scene.bodies.values() for each in body.materials
+            has_history(each) for body in scene.bodies.values() for each in body.materials
         ),
         "materials without mean_dilatation": any(
             has_mean_dilatation(each) for body in scene.bodies.values() for each in body.materials

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeGuard
 
 import numpy as np
 import ufl
@@ -487,3 +487,8 @@ def _logarithm_derivative(values: np.ndarray, axes: np.ndarray) -> np.ndarray:
     full = (outer * quotient.reshape(-1, 1, 9)) @ outer.swapaxes(1, 2)
     full = full.reshape(-1, 3, 3, 3, 3)
     return np.asarray(0.5 * (full + full.swapaxes(3, 4)))
+
+
+def has_history(material: object) -> TypeGuard[HistoryMaterial]:
+    """Return whether the stress of a material depends on what it went through."""
+    return isinstance(material, HistoryMaterial)

@@ -15,7 +15,7 @@ from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.thickness import thickness_on
 from fenics_contact._surfaces.facets import filled_at_corners, nodal_areas
 from fenics_contact.materials.elastic import thickness_of
-from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.results.contact import Status
 from fenics_contact.results.state import State
 
@@ -235,7 +235,7 @@ def _modulus(state: State, pair: int) -> float:
     compliance = 0.0
     for surface in scene.contacts[pair].surfaces:
         body = scene.bodies[surface.body]
-        remembers = isinstance(body.materials[0], HistoryMaterial)
+        remembers = has_history(body.materials[0])
         if remembers or forms.varies(body.materials[0], body.element):
             return float("nan")
         dim = scene.dim

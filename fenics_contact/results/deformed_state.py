@@ -11,7 +11,7 @@ import numpy as np
 
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import collectively
-from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.qp.solution import Solution, contact_step
 from fenics_contact.results.contact import RowValues
 from fenics_contact.results.fields import put_history_stress, von_mises_of
@@ -124,7 +124,7 @@ class DeformedState(State):
     ) -> dict[str, dolfinx.fem.Function]:
         """Return fields of stresses with those of materials with a history in their places. Collective."""
         for name, body in self.scene.bodies.items():
-            if any(isinstance(material, HistoryMaterial) for material in body.materials):
+            if any(has_history(material) for material in body.materials):
                 put_history_stress(
                     fields[name], self.torn, name, self.equilibrium.evaluation.responses, quantity
                 )
