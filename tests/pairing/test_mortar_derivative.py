@@ -17,7 +17,11 @@ from fenics_contact._pairing.mortar.coupling import (
     inverted_pulled_back,
     mortar_coupling,
 )
-from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back, weight_derivatives
+from fenics_contact._pairing.mortar.derivatives import (
+    SurfaceDerivatives,
+    mortar_pulled_back,
+    weight_derivatives,
+)
 from fenics_contact._pairing.mortar.planes import Planes
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, slopes
 from fenics_contact._surfaces.true_surface import reconstructed
@@ -143,35 +147,59 @@ def moved(surface: FacetedSurface, by: np.ndarray) -> FacetedSurface:
     return replace(placed(surface, surface.points + by), relief=surface.relief)
 
 
-def scalar(slave: FacetedSurface, master: FacetedSurface, here: Setting, by: CouplingDerivatives) -> float:
-    found = mortar_coupling(slave, master)
+def scalar(found: MortarCoupling, here: Setting, by: CouplingDerivatives) -> float:
     assert np.array_equal(found.node, here.coupling.node)
     means = found.weight @ by.right
-    if slave.cut.is_cut:
+    if here.slave.cut.is_cut:
         means = means - found.of_slave(by.own)
     weights = np.einsum("nr,nr->", by.left, means)
     return float(by.area @ found.area + weights + np.sum(by.normal * found.normal) + by.gap @ found.gap)
 
 
-def both_ways(
-    here: Setting, by: CouplingDerivatives, ways: tuple[np.ndarray, np.ndarray]
-) -> tuple[float, float, float]:
+@dataclass(frozen=True)
+class Moved:
+    """Both surfaces a step along their ways, and their coupling there."""
+
+    surfaces: tuple[FacetedSurface, FacetedSurface]
+    coupling: MortarCoupling
+
+
+@cache
+def ends(name: str, kinds: tuple[str, str], which: str) -> tuple[Moved, Moved]:
+    """Return what lies a step ahead on random ways and a step behind."""
+    here, ways = setting(name, kinds), random_ways(setting(name, kinds), which)
+    surfaces = [
+        (moved(here.slave, step * ways[0]), moved(here.master, step * ways[1])) for step in (STEP, -STEP)
+    ]
+    ahead, behind = (Moved(pair, mortar_coupling(*pair)) for pair in surfaces)
+    return ahead, behind
+
+
+@cache
+def pulled_back(
+    name: str, kinds: tuple[str, str], term: str
+) -> tuple[CouplingDerivatives, tuple[SurfaceDerivatives, SurfaceDerivatives]]:
+    """Return derivatives by one of the results alone, and by the surfaces."""
+    here = setting(name, kinds)
+    by = here.alone(term)
+    return by, mortar_pulled_back(here.slave, here.master, here.coupling, by)
+
+
+def both_ways(name: str, kinds: tuple[str, str], term: str, which: str) -> tuple[float, float, float]:
     """The derivative along motions of both surfaces, the difference quotient, and the size of summands."""
-    pulled = mortar_pulled_back(here.slave, here.master, here.coupling, by)
+    here, (by, pulled) = setting(name, kinds), pulled_back(name, kinds, term)
+    ways, (ahead, behind) = random_ways(here, which), ends(name, kinds, which)
     found, size = 0.0, 0.0
-    for surface, way, part in zip((here.slave, here.master), ways, pulled, strict=True):
-        ahead, behind = moved(surface, STEP * way), moved(surface, -STEP * way)
+    for side, (way, part) in enumerate(zip(ways, pulled, strict=True)):
+        first, last = ahead.surfaces[side], behind.surfaces[side]
         found += np.sum(part.points * way)
         size += np.abs(part.points * way).sum() + np.abs(part.normals).sum()
-        found += np.sum(part.normals * (ahead.normals - behind.normals)) / (2 * STEP)
-        if surface.relief is not None:
-            every = np.arange(len(surface.facets))
-            found += np.sum(part.slopes * (slopes(ahead, every) - slopes(behind, every))) / (2 * STEP)
-    ends = [
-        scalar(moved(here.slave, s * ways[0]), moved(here.master, s * ways[1]), here, by)
-        for s in (STEP, -STEP)
-    ]
-    return float(found), (ends[0] - ends[1]) / (2 * STEP), float(size)
+        found += np.sum(part.normals * (first.normals - last.normals)) / (2 * STEP)
+        if first.relief is not None:
+            every = np.arange(len(first.facets))
+            found += np.sum(part.slopes * (slopes(first, every) - slopes(last, every))) / (2 * STEP)
+    quotient = (scalar(ahead.coupling, here, by) - scalar(behind.coupling, here, by)) / (2 * STEP)
+    return float(found), quotient, float(size)
 
 
 def random_ways(here: Setting, which: str) -> tuple[np.ndarray, np.ndarray]:
@@ -187,8 +215,7 @@ def random_ways(here: Setting, which: str) -> tuple[np.ndarray, np.ndarray]:
 def test_each_term_agrees_with_central_differences(
     name: str, kinds: tuple[str, str], term: str, which: str
 ) -> None:
-    here = setting(name, kinds)
-    found, quotient, size = both_ways(here, here.alone(term), random_ways(here, which))
+    found, quotient, size = both_ways(name, kinds, term, which)
     # Where edges lie over one another the second derivative jumps, and the quotient is of the first order.
     assert abs(found - quotient) < TOLERANCE[name] * size + 3e-8
     assert size > 1e-3 or (which == "master" and term in ("normal", "area"))
@@ -213,10 +240,9 @@ def test_what_passes_over_the_edges_of_a_matching_master_counts(
     """Where the functions of both sides are not the same, so that one side's do not continue the other's."""
     here = setting("matching", kinds)
     ways = random_ways(here, "master")
-    by = here.alone("weight")
-    _, quotient, size = both_ways(here, by, ways)
+    _, quotient, size = both_ways("matching", kinds, "weight", "master")
     monkeypatch.setattr(coupling_derivative, "moved_aside", lambda master: master)
-    _, exactly = mortar_pulled_back(here.slave, here.master, here.coupling, by)
+    _, exactly = mortar_pulled_back(here.slave, here.master, here.coupling, here.alone("weight"))
     assert abs(np.sum(exactly.points * ways[1]) - quotient) > 1e-3 * size
 
 
