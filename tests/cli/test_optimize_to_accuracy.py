@@ -24,6 +24,8 @@ lower = -0.01
 upper = 0.01
 """
 ROLLER = (ROOT / "demos" / "scenes" / "plate_on_roller.toml").read_text(encoding="utf-8")
+#: What a mesh may be predicted to take depends on how busy the machine is.
+ANY_TIME = ("--set", "accuracy.seconds=1e9")
 
 
 def optimised(folder: Path, *options: str, text: str = ROLLER + DESIGN) -> int:
@@ -35,7 +37,7 @@ def optimised(folder: Path, *options: str, text: str = ROLLER + DESIGN) -> int:
 def test_an_optimisation_to_an_accuracy_writes_its_meshes_and_the_design(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert optimised(tmp_path, "--accuracy", "10%", "--set", "output.files=['vtu', 'csv']") == 0
+    assert optimised(tmp_path, "--accuracy", "10%", *ANY_TIME, "--set", "output.files=['vtu', 'csv']") == 0
     printed = capsys.readouterr().out
     assert "accuracy        objective to 10 %\n" in printed
     table = printed[printed.index("    cells") :].split("\n\n")[0].splitlines()
