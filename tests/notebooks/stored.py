@@ -42,9 +42,7 @@ def source(name: str) -> Any:
 
 def stored(name: str) -> Any:
     """Return the notebook with the results that are stored in the repository."""
-    import nbformat
-
-    return nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
+    return program().nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
 
 
 def asserted_numbers(notebook: Any) -> dict[int, np.ndarray]:

@@ -8,7 +8,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import pytest
 
 from tests.conftest import ROOT
@@ -39,7 +38,7 @@ def test_a_stored_notebook_is_that_of_its_source(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_stored_notebook_was_run_from_top_to_bottom(name: str) -> None:
     notebook = stored(name)
-    nbformat.validate(notebook)
+    program().nbformat.validate(notebook)
     cells = code_cells(notebook)
     assert [cell.execution_count for cell in cells] == list(range(1, len(cells) + 1))
     shows = [
@@ -124,8 +123,9 @@ def test_links_between_notebooks_lead_somewhere(name: str) -> None:
 
 
 def a_notebook(*cells: str) -> Any:
-    notebook = nbformat.v4.new_notebook()
-    notebook.cells = [nbformat.v4.new_code_cell(cell) for cell in cells]
+    made = program().nbformat.v4
+    notebook = made.new_notebook()
+    notebook.cells = [made.new_code_cell(cell) for cell in cells]
     return notebook
 
 
