@@ -116,13 +116,13 @@ def launcher(ranks: int) -> list[str]:
 def sharing_launcher(ranks: int) -> list[str]:
     """Return a launcher by which ranks may outnumber the cores: with options of Open MPI, MPICH needs none.
 
-    The names of these settings in the environment differ from version to version of Open MPI, and some warn
-    of those of others.
+    Names of these options in the environment differ between versions of Open MPI, some warn of others'.
     """
     start = launcher(ranks)
     # Open MPI's on Ubuntu 26.04 does not find its own name.
     if start and not re.search("HYDRA|MPICH|Intel", finished([start[0], "--version"], 60.0).output):
         start[1:1] = ["--oversubscribe", "--bind-to", "none"]
+        start[:0] = ["env", "OMPI_MCA_mpi_yield_when_idle=1"]  # a process alone has nobody to yield to
     return start
 
 

@@ -12,7 +12,7 @@ from fenics_contact import clean_environment
 from fenics_contact._base import launching
 from fenics_contact._base.launching import last_words, launcher, traces
 from fenics_contact.errors import MissingRequirementError
-from tests.conftest import LAUNCH, launch
+from tests.conftest import LAUNCH, ROOT, launch, read_environment
 
 #: A process without a shell between: its environment is that which MPI_Init wrote into, not `os.environ`.
 STARTING = f"""
@@ -109,6 +109,16 @@ def test_ranks_may_outnumber_the_cores(
     launching.main()
     words = capsys.readouterr().out.split()
     assert words[words.index(str(mpirun)) + 1 :] == [*options, "-n", "4"]
+    assert ("OMPI_MCA_mpi_yield_when_idle=1" in words) == bool(options)
+
+
+@pytest.mark.parametrize(("ranks", "waiting"), [(1, "None"), (2, "1")])
+def test_ranks_that_wait_give_their_cores_away_and_a_process_alone_keeps_its_core(
+    ranks: int, waiting: str, mpirun: Callable[..., str]
+) -> None:
+    code = "import os; print(os.environ.get('OMPI_MCA_mpi_yield_when_idle'))"
+    assert "OMPI_MCA_mpi_yield_when_idle" not in read_environment(ROOT / "scripts" / "environment")
+    assert mpirun(code, ranks).split() == [waiting] * ranks
 
 
 def test_a_process_without_a_word_gets_some(monkeypatch: pytest.MonkeyPatch) -> None:
