@@ -134,10 +134,10 @@ def _descended(
     for _ in range(HALVINGS):
         size *= 0.5
         for along in np.concatenate([np.eye(width), -np.eye(width)]):
-            tried = local + size * along
+            tried, there = local + size * along, np.full(len(facet), np.inf)
             inside = outside(tried, corners) == 0.0
-            there = np.full(len(facet), np.inf)
-            there[inside] = gaps_at(facet[inside], tried[inside])
+            if inside.any():
+                there[inside] = gaps_at(facet[inside], tried[inside])
             lower = there < gap - same
             local, gap = np.where(lower[:, None], tried, local), np.where(lower, there, gap)
     return local, gap

@@ -90,15 +90,15 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     g|`` is used; surfaces that face the same way do not touch. Points without any that lie beside the surface
     by no more than a twentieth of a facet's width are projected on the facet's continuation.
     """
-    corners = master.points[master.facets]
-    centroids = corners.mean(axis=1)
-    radius = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
-    tree, rounding = cKDTree(centroids), coordinate_rounding(master.points)
+    corners, rounding = master.points[master.facets], coordinate_rounding(master.points)
+    tree = cKDTree(corners.mean(axis=1))
+    radius = np.linalg.norm(corners - tree.data[:, None], axis=2).max(axis=1)
     near = _solve(points, normals, master, *nearest_facets(tree, points), rounding)
-    near = best_projections(near.part(near.beside == 0.0), rounding)
-    waiting = np.setdiff1d(np.arange(len(points)), near.point)
-    reached = _solve(points, normals, master, *facets_in_reach(tree, radius, points, waiting), rounding)
-    projection = join([near, best_projections(reached, rounding)])
+    projection = best_projections(near.part(near.beside == 0.0), rounding)
+    waiting = np.setdiff1d(np.arange(len(points)), projection.point)
+    if len(waiting):
+        reached = _solve(points, normals, master, *facets_in_reach(tree, radius, points, waiting), rounding)
+        projection = join([projection, best_projections(reached, rounding)])
     gap = projection.gap - heights(master, projection.facet, projection.local).value
     return replace(projection, gap=gap, lost=np.setdiff1d(projection.lost, projection.point))
 
