@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -74,6 +75,12 @@ def pressed(
     return solve_scene(Scene(bodies, supports, contacts=[pair]), MPI.COMM_SELF)
 
 
+@cache
+def force_by_nodes(strain: str, cells: int = 5, angle: float = TURN, offset: float = 0.0) -> np.ndarray:
+    """Return the force on the floor where nodes of the bar press it."""
+    return force_on(pressed(MATERIALS[strain], "bar under", "floor y1", "node", cells, angle, offset))
+
+
 def force_on(state: Any, name: str = "floor y0") -> np.ndarray:
     return np.asarray(state.reactions()[name].force)
 
@@ -88,7 +95,7 @@ def require_upright(force: np.ndarray, size: float) -> None:
 @pytest.mark.parametrize("strain", MATERIALS)
 def test_a_corner_presses_along_the_normal_of_the_floor(strain: str, cells: int) -> None:
     material = MATERIALS[strain]
-    size = np.linalg.norm(force_on(pressed(material, "bar under", "floor y1", "node", cells)))
+    size = np.linalg.norm(force_by_nodes(strain, cells))
     assert size > 5.0
     for slave in ("bar under", "bar y0"):
         state = pressed(material, slave, "floor y1", "mortar", cells)
@@ -119,7 +126,7 @@ def test_a_corner_of_the_master_is_never_wrong_in_silence(strain: str, kind: str
     for angle, offset in ((20.0, 0.0), (45.0, -0.1), (70.0, -0.16)):
         there = {"angle": np.radians(angle), "offset": offset}
         state = pressed(MATERIALS[strain], "floor y1", "bar under", kind, **there)
-        right = force_on(pressed(MATERIALS[strain], "bar under", "floor y1", "node", **there))
+        right = force_by_nodes(strain, **there)
         error = np.linalg.norm(force_on(state) - right) / np.linalg.norm(right)
         named = any(
             isinstance(each, CornerBetweenNodes | CornerKeptAway) for each in state.peak_uncertainties
@@ -163,11 +170,9 @@ def floor_as_slave(
 def test_a_floor_named_as_slave_is_pressed_straight_down(
     strain: str, cells: int, caplog: pytest.LogCaptureFixture
 ) -> None:
-    material = MATERIALS[strain]
-    by_nodes = pressed(material, "bar under", "floor y1", "node", cells)
     with caplog.at_level("INFO"):
-        state = pressed(material, "floor y1", "bar under", "best", cells)
-    require_upright(force_on(state), float(np.linalg.norm(force_on(by_nodes))))
+        state = pressed(MATERIALS[strain], "floor y1", "bar under", "best", cells)
+    require_upright(force_on(state), float(np.linalg.norm(force_by_nodes(strain, cells))))
     (pair,) = state.scene.contacts
     assert pair.place == "bar under on floor y1"
     assert pair.reason == f"mortar, as the meshes do not match{EXCHANGED}"
@@ -184,8 +189,7 @@ def test_a_corner_whose_face_is_steep_takes_the_place_of_the_floor_as_well() -> 
     (pair,) = state.scene.contacts
     assert pair.place == "bar x0 on floor y1"
     assert pair.reason.startswith("node, as no facets face each other")
-    by_nodes = pressed(MATERIALS["small"], "bar under", "floor y1", "node")
-    require_upright(force_on(state), float(np.linalg.norm(force_on(by_nodes))))
+    require_upright(force_on(state), float(np.linalg.norm(force_by_nodes("small"))))
 
 
 @pytest.mark.parametrize(
@@ -256,14 +260,12 @@ def test_edges_of_faces_that_lie_flat_are_no_corners_that_press(strain: str, sla
 
 def test_faces_beside_a_corner_press_straight_down_as_well() -> None:
     """Where the mesh is fine, they touch, too: small displacements leave them as steep as they are."""
-    sides = "bar under", "floor y1"
-    ways = ("node", "mortar")
-    by_nodes, by_mortar = (force_on(pressed(MATERIALS["small"], *sides, way, 40)) for way in ways)
-    require_upright(by_mortar, float(np.linalg.norm(by_nodes)))
+    by_mortar = force_on(pressed(MATERIALS["small"], "bar under", "floor y1", "mortar", 40))
+    require_upright(by_mortar, float(np.linalg.norm(force_by_nodes("small", 40))))
 
 
 def test_a_face_too_steep_to_face_the_floor_touches_by_its_nodes() -> None:
-    size = np.linalg.norm(force_on(pressed(MATERIALS["small"], "bar under", "floor y1", "node")))
+    size = np.linalg.norm(force_by_nodes("small"))
     state = pressed(MATERIALS["small"], "bar x0", "floor y1", "best")
     (pair,) = state.scene.contacts
     assert pair.reason == "node, as no facets face each other: corners or edges touch"
@@ -275,7 +277,7 @@ def test_a_steep_face_alone_is_right_or_the_face_that_passes_is_named(
     cells: int, passes: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     """With large strains and cells small enough the other face beside the corner touches, too."""
-    size = np.linalg.norm(force_on(pressed(MATERIALS["large"], "bar under", "floor y1", "node", cells)))
+    size = np.linalg.norm(force_by_nodes("large", cells))
     caplog.clear()
     state = pressed(MATERIALS["large"], "bar x0", "floor y1", "best", cells)
     force = force_on(state)
