@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -176,6 +177,11 @@ def solved(case: Case) -> AnyState:
     return solve_scene(case.scene, MPI.COMM_SELF, partitions=cuts(case), tolerance=tolerance_of(case.scene))
 
 
+@cache
+def state_of(name: str) -> AnyState:
+    return solved(CASES[name])
+
+
 def tolerance_of(scene: Scene) -> float:
     return 1e-6 if scene.contacts else 1e-10
 
@@ -193,14 +199,14 @@ def test_every_part_that_is_watched_is_called_by_some_scene() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_only_forms_that_a_scene_calls_for_are_compiled(name: str) -> None:
-    state = solved(CASES[name])
+    state = state_of(name)
     compiled = [kind for kind, *_ in state.torn.decomposition.forms.compiled]
     assert sorted(compiled) == sorted({"stiffness"} | CASES[name].forms), "each of them once"
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_only_multipliers_that_a_scene_calls_for_exist(name: str) -> None:
-    scene, state = CASES[name].scene, solved(CASES[name])
+    scene, state = CASES[name].scene, state_of(name)
     counts, rubs = state.counts, [pair for pair in scene.contacts if pair.has_friction]
     assert (counts["normal_multipliers"] > 0) == bool(scene.contacts)
     assert (counts["tangential_multipliers"] > 0) == bool(rubs)
@@ -214,7 +220,7 @@ def test_only_multipliers_that_a_scene_calls_for_exist(name: str) -> None:
 
 
 def test_the_direct_solve_has_no_coarse_problem_and_no_products() -> None:
-    state = solved(CASES["surface load"])
+    state = state_of("surface load")
     assert state.counts["f_products"] == 0
     assert not hasattr(state.system, "problem")
     assert not hasattr(state.system, "kernel")
@@ -247,7 +253,7 @@ def test_fields_on_meshes_are_built_when_they_are_asked_for() -> None:
 
 
 def test_a_frictionless_state_has_no_slip_bounds() -> None:
-    state = solved(CASES["contact"])
+    state = state_of("contact")
     layout = state.dual.problem.layout
     assert layout.tangential.size == 0
     assert layout.normal.size == state.contact.points.count > 0
@@ -256,7 +262,7 @@ def test_a_frictionless_state_has_no_slip_bounds() -> None:
 
 
 def test_tresca_bounds_stay_what_they_were() -> None:
-    contact = solved(CASES["Tresca"]).contact
+    contact = state_of("Tresca").contact
     np.testing.assert_allclose(contact.slip_bound, 0.1 * contact.points.area, rtol=1e-14)
     assert contact.normal_force.max() > 0
 
