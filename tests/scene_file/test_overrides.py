@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -106,16 +107,17 @@ def test_keys_are_found_on_their_lines(path: tuple[str | int, ...], line: int) -
     assert nearest(lines_of(TEXT), path) == line
 
 
-def drafts() -> Any:
-    """Return what checks schemas; to load it takes two seconds, which every worker would need for itself."""
+@cache
+def by_schema() -> Any:
+    """Return what checks scene files; to load it takes two seconds, which every worker would need."""
     from jsonschema import Draft202012Validator
 
-    return Draft202012Validator
+    return Draft202012Validator(json_schema())
 
 
 def test_the_schema_is_one() -> None:
     schema = json_schema()
-    drafts().check_schema(schema)
+    by_schema().check_schema(schema)
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert "[force / length²]" in json.dumps(schema, ensure_ascii=False), "editors show units"
 
@@ -127,7 +129,7 @@ def test_the_schema_beside_the_examples_is_the_present_one() -> None:
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_the_schema_knows_the_examples(path: Path) -> None:
-    drafts()(json_schema()).validate(tomllib.loads(path.read_text()))
+    by_schema().validate(tomllib.loads(path.read_text()))
     assert path.read_text().startswith("#:schema scene_file.schema.json\n"), "editors look for it"
 
 
@@ -151,7 +153,7 @@ NO_TOML = {"a bracket is not closed", "a byte-order mark comes first", "a key is
 def test_editors_see_the_mistakes_that_a_schema_can_know(name: str) -> None:
     old, new, _ = MISTAKES[name]
     data: dict[str, Any] = tomllib.loads(changed((old, new)))
-    found = list(drafts()(json_schema()).iter_errors(data))
+    found = list(by_schema().iter_errors(data))
     assert bool(found) == (name not in BEYOND)
 
 
