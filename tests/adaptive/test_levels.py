@@ -231,12 +231,12 @@ def test_a_quantity_without_adjoint_has_the_error_that_changes_tell(caplog):
     scene = pressed()
     pair = replace(scene.contacts[0], friction=Coulomb(0.5))
     with caplog.at_level(logging.WARNING, logger="fenics_contact"):
-        found = solve_to(replace(scene, contacts=[pair]), "stick_area", 0.1, MPI.COMM_SELF)
+        found = solve_to(replace(scene, contacts=[pair]), "stick_area", 0.2, MPI.COMM_SELF)
     (words,) = (record.message for record in caplog.records if "judged by" in record.message)
     assert re.match(r"the error is judged by the changes .* alone: an area changes by the statuses", words)
     assert np.isinf(found.levels[0].error)
     last, before = found.levels[-1], found.levels[-2]
-    assert 0.0 < last.error <= 0.1 * last.value
+    assert 0.0 < last.error <= 0.2 * last.value
     assert last.error <= 9.0 * abs(last.value - before.value) + 1e-12
 
 
