@@ -12,8 +12,8 @@ from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 from scipy.spatial.transform import Rotation
 
 from fenics_contact._base.checks import STEEPEST
-from fenics_contact._scene_file.part import Part, keys_of, table_of
-from fenics_contact._scene_file.source import branches
+from fenics_contact._scene_file.part import Part, built, keys_of, table_of
+from fenics_contact._scene_file.source import parts_of
 from fenics_contact._scene_file.values import (
     NumberOrPairs,
     Numbers,
@@ -79,20 +79,6 @@ _LIST = Annotated[
 _OF_SURFACES = dict[str, Annotated[Any, Read(either(list, _SEVERAL, _ONE))]]
 #: A list of groups, or surface to group, groups, or tables that choose faces.
 SurfaceGroups: TypeAlias = Annotated[Any, Read(either(dict, _OF_SURFACES, _LIST))]
-
-
-def made_choice(given: Any) -> Any:
-    """Return what the readers of meshes take."""
-    if isinstance(given, Mapping):
-        return {name: made_choice(wanted) for name, wanted in given.items()}
-    if isinstance(given, list):
-        return [made_choice(wanted) for wanted in given]
-    return given.made() if isinstance(given, Part) else given
-
-
-def by_place(given: Any) -> bool:
-    """Return whether any face is chosen by where it lies."""
-    return any(isinstance(part, Part) for _, part in branches(given))
 
 
 ISOTROPIC: dict[str, Callable[..., Material]] = {
@@ -363,7 +349,7 @@ class MeshFile(Placed):
         return any(getattr(self, key) != type(self).model_fields[key].default for key in keys)
 
     def _read(self, path: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:
-        kind, groups = path.suffix.lower(), (self.bodies, made_choice(self.surfaces))
+        kind, groups = path.suffix.lower(), (self.bodies, built(self.surfaces))
         if self.deck:
             if self._gives("bodies", "surfaces", "labels", "size", "sizes", "order", "corners_only"):
                 raise InvalidInputError(
@@ -377,7 +363,7 @@ class MeshFile(Placed):
             )
         if kind in CAD:
             return cad.read_cad(path, self.size, *groups, sizes=self.sizes, order=self.order, comm=comm)
-        if by_place(self.surfaces):
+        if any(parts_of(self.surfaces, Part)):
             raise InvalidInputError(
                 f"faces are chosen by place in CAD files ({', '.join(CAD)}), got {self.file!r}: choose groups"
             )

@@ -23,7 +23,7 @@ from fenics_contact._scene.preloads import Preload, Section
 from fenics_contact._scene.sectors import CyclicSymmetry
 from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import RigidSurface, Roller, Support, ToolMotion
-from fenics_contact._scene_file.part import Part, keys_of, not_in_files, table_of
+from fenics_contact._scene_file.part import Part, built, keys_of, not_in_files, table_of
 from fenics_contact._scene_file.values import (
     FREE,
     Components,
@@ -560,7 +560,7 @@ class ConstraintPart(Part):
 
     def made(self, **other: Any) -> LinearConstraint:
         """Build the constraint."""
-        return super().made(terms=[term.made() for term in self.terms], name=self.name)
+        return super().made(terms=built(self.terms), name=self.name)
 
     @classmethod
     def written(cls, made: Any) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import singledispatch
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, create_model, model_validator
@@ -12,7 +13,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
 from fenics_contact._base.checks import MOST, GivenVector, meaning
 from fenics_contact._scene.fields import ScalarValue, VectorValue
-from fenics_contact._scene_file.source import Path, branches
+from fenics_contact._scene_file.source import Path, parts_of
 from fenics_contact._scene_file.values import (
     CountPair,
     CountTriple,
@@ -85,9 +86,8 @@ class Part(BaseModel):
 
     def made(self, **other: Any) -> Any:
         """Build the object of the table, with other values for some arguments."""
-        own = {name: getattr(self, name) for name in self.given}
-        parts = {name: value.made() for name, value in own.items() if isinstance(value, Part)}
-        return type(self).of(**{**own, **parts, **other})
+        own = {name: built(getattr(self, name)) for name in self.given}
+        return type(self).of(**{**own, **other})
 
     @classmethod
     def describes(cls, made: object) -> bool:
@@ -131,6 +131,17 @@ class Part(BaseModel):
             }  # fmt: skip
         explained = PydanticCustomError("explained", "{kind}", context)
         return {"type": explained, "loc": error["loc"], "input": error["input"]}
+
+
+@singledispatch
+def built(value: Any) -> Any:
+    """Return what a value of a table stands for: of tables, in lists and mappings, too, their objects."""
+    return value
+
+
+built.register(Part, lambda value: value.made())
+built.register(list, lambda value: [built(part) for part in value])
+built.register(dict, lambda value: {name: built(part) for name, part in value.items()})
 
 
 def keys_of(
@@ -198,6 +209,6 @@ def not_in_files(what: str) -> InvalidInputError:
 
 def values_of(data: Any, key: str, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     """Yield what tables give under a key, with paths."""
-    for place, part in branches(data, path):
-        if isinstance(part, Part) and getattr(part, key, None) is not None:
+    for place, part in parts_of(data, Part, path):
+        if getattr(part, key, None) is not None:
             yield (*place, key), getattr(part, key)

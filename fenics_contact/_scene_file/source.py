@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import tomllib
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import cached_property
+from functools import cached_property, singledispatch
 from pathlib import Path as FilePath
-from typing import Any, TypeAlias
+from types import NoneType
+from typing import Any, TypeAlias, TypeVar
 
 import tomlkit
 import tomlkit.exceptions
@@ -34,8 +35,7 @@ _BARE_PART = re.compile(r"[A-Za-z0-9_-]+")
 def written(path: Path) -> str:
     """Return a path in the form of `--set`: ``contacts.0.friction``."""
     return ".".join(
-        str(part) if isinstance(part, int) or _BARE_PART.fullmatch(part) else f'"{shortened(visible(part))}"'
-        for part in path
+        part if _BARE_PART.fullmatch(part) else f'"{shortened(visible(part))}"' for part in map(str, path)
     )
 
 
@@ -46,24 +46,50 @@ def shortened(text: str) -> str:
 
 def as_toml(value: Any) -> str:
     """Return a value in TOML's form, shortened if it is long."""
-    if isinstance(value, Mapping):
-        text = f"a table with {', '.join(map(str, value))}" if value else "an empty table"
-    elif value is None:
-        text = "nothing"
-    else:
-        text = _as_toml(value)
-    return shortened(visible(" ".join(text.split())))
+    return shortened(visible(" ".join(_as_toml(value).split())))
 
 
+@singledispatch
 def _as_toml(value: Any) -> str:
-    if isinstance(value, str | list | tuple):
-        value = value[:LONGEST]
-    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
-        return "an integer of more than 1000 digits"  # Python refuses to convert it
     try:
         return tomlkit.item(value).as_string()
     except (TypeError, ValueError):
         return repr(value)
+
+
+_of_any: Callable[[Any], str] = _as_toml.dispatch(object)
+_as_toml.register(NoneType, lambda value: "nothing")
+
+
+@_as_toml.register(Mapping)
+def _(value: Mapping[Any, Any]) -> str:
+    return f"a table with {', '.join(map(str, value))}" if value else "an empty table"
+
+
+@_as_toml.register(str)
+@_as_toml.register(list)
+@_as_toml.register(tuple)
+def _(value: str | list[Any] | tuple[Any, ...]) -> str:
+    return _of_any(value[:LONGEST])
+
+
+@_as_toml.register(int)
+def _(value: int) -> str:
+    if value.bit_length() > _MOST_BITS:
+        return "an integer of more than 1000 digits"  # Python refuses to convert it
+    return _of_any(value)
+
+
+@singledispatch
+def _entries(data: Any) -> Iterable[tuple[Any, Any]]:
+    """Return what lists, tables and checked tables hold, by position or key; nothing of other data."""
+    return ()
+
+
+_entries.register(list, enumerate)
+_entries.register(tuple, enumerate)
+_entries.register(Mapping, lambda data: data.items())
+_entries.register(BaseModel, iter)
 
 
 def branches(data: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
@@ -72,12 +98,17 @@ def branches(data: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     while waiting:  # data may be nested deeper than Python's recursion limit
         path, data = waiting.pop()
         yield path, data
-        inner: Any = ()
-        if isinstance(data, list | tuple):
-            inner = enumerate(data)
-        elif isinstance(data, Mapping | BaseModel):
-            inner = data.items() if isinstance(data, Mapping) else data
-        waiting += [((*path, key), part) for key, part in inner]
+        waiting += [((*path, key), part) for key, part in _entries(data)]
+
+
+Kind = TypeVar("Kind")
+
+
+def parts_of(data: Any, kind: type[Kind], path: Path = ()) -> Iterator[tuple[Path, Kind]]:
+    """Yield everything of a kind in plain data or a table, with paths."""
+    for place, part in branches(data, path):
+        if isinstance(part, kind):
+            yield place, part
 
 
 def value_at(data: Any, path: Path) -> Any:
@@ -90,20 +121,35 @@ def value_at(data: Any, path: Path) -> Any:
     return data
 
 
-def replaced(data: Any, path: Path, value: Any) -> Any:
-    """Return a copy of the data with another value at a path."""
+def replaced(data: Any, path: Sequence[str], value: Any) -> tuple[Path, Any]:
+    """Return a path with numbers for entries of lists, and a copy of the data with another value there."""
     if not path:
-        return value
-    first, rest = path[0], path[1:]
-    if isinstance(data, Mapping):
-        return {**data, str(first): replaced(data.get(str(first), {}), rest, value)}
-    if isinstance(data, Sequence) and not isinstance(data, str):
-        if not str(first).isdecimal() or int(first) >= len(data):
-            raise KeyError(f"{first} of {len(data)} entries, numbered from 0")
-        changed = list(data)
-        changed[int(first)] = replaced(data[int(first)], rest, value)
-        return changed
-    raise KeyError(f"{first}, but there is {as_toml(data)}")
+        return (), value
+    key, inner, renewed = _entry(data, path[0])
+    rest, new = replaced(inner, path[1:], value)
+    return (key, *rest), renewed(new)
+
+
+@singledispatch
+def _entry(data: Any, key: str) -> tuple[str | int, Any, Callable[[Any], Any]]:
+    """Return a key, a number in lists, what is there, and what makes a copy with another value there."""
+    raise KeyError(f"{key}, but there is {as_toml(data)}")
+
+
+_entry.register(str, _entry.dispatch(object))
+
+
+@_entry.register(Mapping)
+def _(data: Mapping[str, Any], key: str) -> tuple[str | int, Any, Callable[[Any], Any]]:
+    return key, data.get(key, {}), lambda new: {**data, key: new}
+
+
+@_entry.register(Sequence)
+def _(data: Sequence[Any], key: str) -> tuple[str | int, Any, Callable[[Any], Any]]:
+    if not key.isdecimal() or int(key) >= len(data):
+        raise KeyError(f"{key} of {len(data)} entries, numbered from 0")
+    number = int(key)
+    return number, data[number], lambda new: [*data[:number], new, *data[number + 1 :]]
 
 
 _BARE = r"[A-Za-z0-9_-]+"
@@ -228,7 +274,7 @@ def key_parts(key: str) -> list[str]:
     if not _KEY.fullmatch(key):
         return names
     inner: Any = tomllib.loads(f"{key} = 0")
-    while isinstance(inner, Mapping):
+    while inner:
         ((name, inner),) = inner.items()
         names.append(name)
     return names
@@ -265,11 +311,9 @@ class SceneFileError(InvalidInputError):
         mistakes: The mistakes in the order of their lines.
     """
 
-    def __init__(self, name: str, mistakes: Iterable[Mistake] | str = ()) -> None:
+    def __init__(self, name: str, mistakes: Iterable[Mistake] = ()) -> None:
         """Build the message from the mistakes."""
-        ordered = (
-            () if isinstance(mistakes, str) else tuple(sorted(mistakes, key=lambda mistake: mistake.line))
-        )
+        ordered = tuple(sorted(mistakes, key=lambda mistake: mistake.line))
         self.mistakes: tuple[Mistake, ...] = ordered
         if not ordered:
             super().__init__(name)
@@ -333,9 +377,7 @@ class Source:
         data, places = dict(self.data), dict(self.overrides)
         for override in overrides:
             try:
-                path, value = _parsed(override)
-                path = _resolved(data, path)
-                data = replaced(data, path, value)
+                path, data = replaced(data, *_parsed(override))
             except (KeyError, ValueError) as error:
                 reason = error.args[0] if error.args else error
                 words = (
@@ -357,15 +399,15 @@ def parse(text: str, name: str, folder: FilePath) -> Source:
         raise SceneFileError(name, [Mistake((), 1, "line 1", words)])
     try:
         return Source(name, folder, tomllib.loads(text), text)
-    except (ValueError, RecursionError) as error:
-        raise SceneFileError(name, [_no_toml(text, error)]) from error
+    except ValueError as error:
+        raise SceneFileError(name, [_no_toml(text, str(error))]) from error
+    except RecursionError as error:
+        raise SceneFileError(name, [_no_toml(text, "brackets are nested too deeply")]) from error
 
 
-def _no_toml(text: str, error: Exception) -> Mistake:
+def _no_toml(text: str, reason: str) -> Mistake:
     """Describe why a text is not TOML, by tomlkit's message if it has one, which is more precise."""
-    reason, line = str(error), 0
-    if isinstance(error, RecursionError):
-        reason = "brackets are nested too deeply"
+    line = 0
     try:
         tomlkit.parse(text)
     except tomlkit.exceptions.ParseError as better:
@@ -381,7 +423,7 @@ def _no_toml(text: str, error: Exception) -> Mistake:
     return Mistake((), line, f"line {line}" if line else "", words)
 
 
-def _parsed(override: str) -> tuple[Path, Any]:
+def _parsed(override: str) -> tuple[list[str], Any]:
     key, equals, value = override.partition("=")
     if not equals:
         raise ValueError("there is no =")
@@ -391,18 +433,8 @@ def _parsed(override: str) -> tuple[Path, Any]:
     with suppress(ValueError, RecursionError):
         parsed = tomllib.loads(f"x = {value}")
         if list(parsed) == ["x"]:
-            return tuple(path), parsed["x"]
-    return tuple(path), value.strip()
-
-
-def _resolved(data: Any, path: Path) -> Path:
-    """Return a path with numbers for list entries."""
-    resolved: list[str | int] = []
-    for part in path:
-        numbered = isinstance(data, Sequence) and not isinstance(data, str) and str(part).isdecimal()
-        resolved.append(int(part) if numbered else part)
-        data = value_at(data, (resolved[-1],))
-    return tuple(resolved)
+            return path, parsed["x"]
+    return path, value.strip()
 
 
 @contextmanager

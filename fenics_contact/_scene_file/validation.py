@@ -19,6 +19,7 @@ from fenics_contact._scene_file.source import (
     as_toml,
     branches,
     listed,
+    parts_of,
     suggestion,
     value_at,
     written,
@@ -89,10 +90,8 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
     for name, body in document.bodies.items():
         yield ("bodies", name, "mesh"), body.mesh, "a mesh"
         made_of: Any = body.material
-        for region in made_of if isinstance(made_of, Mapping) else ():
-            yield ("bodies", name, "material", region), made_of[region], "a material"
-        if isinstance(made_of, str):
-            yield ("bodies", name, "material"), made_of, "a material"
+        for path, material in parts_of(made_of, str, ("bodies", name, "material")):
+            yield path, material, "a material"
     for path, body in values_of(document, "body"):
         yield path, body, "a body"
     cuts = document.solver.subdomains
@@ -110,8 +109,8 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
 
 def surface_parts(document: Document) -> Iterator[tuple[Path, Any]]:
     """Yield every part that names a surface of a body's mesh, with its path."""
-    for path, part in branches(document):
-        if isinstance(part, Part) and hasattr(part, "surface") and path[0] not in ("design", "accuracy"):
+    for path, part in parts_of(document, Part):
+        if hasattr(part, "surface") and path[0] not in ("design", "accuracy"):
             yield path, part
 
 
