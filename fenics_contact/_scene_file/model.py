@@ -26,12 +26,15 @@ from fenics_contact._scene.supports import RigidSurface, Roller, Support, ToolMo
 from fenics_contact._scene_file.part import Part, built, keys_of, not_in_files, table_of
 from fenics_contact._scene_file.values import (
     FREE,
+    OF_SCALAR,
     Components,
     Expression,
     FieldOrMeasured,
+    Formula,
     Motion,
     Names,
     NotNegativeField,
+    OfFile,
     PlaceOfFile,
     Scalar,
     ScalarField,
@@ -39,6 +42,7 @@ from fenics_contact._scene_file.values import (
     Triple,
     Vector,
     VectorExpression,
+    at_point,
     at_time,
     either,
     field_or,
@@ -67,7 +71,7 @@ class ObstaclePath:
         """Return rotation and translation at a time."""
         point = np.array(self.about)
         now = [at_time(part, time) for part in self.motion]
-        numbers = [float(part(point[None])[0]) if isinstance(part, Expression) else part for part in now]
+        numbers = [at_point(part, point) for part in now]
         shift, angle = np.split(np.array(numbers), [len(point)])
         about = Rotation.from_rotvec(angle if len(point) == 3 else (0.0, 0.0, angle[0]))
         turn = about.as_matrix()[: len(point), : len(point)]
@@ -113,7 +117,7 @@ class ObstaclePart(Part):
 
 
 @keys_of(Triangulation, only=("smooth",))
-class TriangulationPart(ObstaclePart):
+class TriangulationPart(OfFile, ObstaclePart):
     """A body bounded by the triangles of a file."""
 
     obstacle: Literal["triangulation"]
@@ -132,9 +136,9 @@ class TriangulationPart(ObstaclePart):
         file, scale, smooth = self.key
         return read_triangulation(folder / file, scale=scale, smooth=smooth, comm=comm)
 
-    def of_shape(self, shape: Triangulation) -> Any:
+    def taking(self, read: Triangulation) -> Any:
         """Return the obstacle of triangles that were read."""
-        return self._moving(shape)
+        return self._moving(read)
 
 
 @keys_of(Surface)
@@ -150,10 +154,10 @@ class SurfaceOfBody(Part):
         return self.name
 
 
-def _function(value: float | Expression) -> Expression:
-    return value if isinstance(value, Expression) else Expression(repr(value))
-
-
+#: A formula, also of a number alone.
+_Function: TypeAlias = Annotated[
+    Annotated[float, AfterValidator(lambda value: Expression(repr(value)))] | Formula, OF_SCALAR
+]
 OBSTACLES = (
     table_of(obstacles_module.RigidPlane, ObstaclePart, obstacle="plane"),
     table_of(obstacles_module.RigidSphere, ObstaclePart, obstacle="sphere"),
@@ -167,7 +171,7 @@ OBSTACLES = (
         only=["function"],
         obstacle="distance",
         function=(
-            Annotated[Scalar, AfterValidator(_function)],
+            _Function,
             Field(
                 alias="formula",
                 description="signed distance, negative inside, [length], as a formula in x, y, z whose "
@@ -421,6 +425,7 @@ class InitialStressLoad(_Load):
 class SupportPart(_Named):
     """Displacement prescribed on a surface, component by component."""
 
+    on_nodes: ClassVar[bool] = True
     value: Components | None = Field(
         None,
         description="displacement along x, y and z (x, y of a plane body; r, z and around the axis where "
@@ -437,6 +442,7 @@ class SupportPart(_Named):
 class RigidPart(_Named):
     """A surface that moves as one rigid piece, driven or loaded at a point."""
 
+    on_nodes: ClassVar[bool] = True
     kind: Literal["rigid"]
     value: Motion | None = Field(
         None,
@@ -458,17 +464,11 @@ class RigidPart(_Named):
 
     def build(self, dim: int, value: tuple[Any, ...]) -> RigidSurface:
         """Return the rigid surface with a motion, its own or that of a load step."""
-        motion = tuple(map(self._number, value))
+        motion = tuple(at_point(each, self.at) for each in value)  # type: ignore[attr-defined]
         turned = motion[dim:]
         return self.made(
             displacement=motion[:dim], rotation=turned[0] if dim == 2 and len(turned) == 1 else turned
         )
-
-    def _number(self, component: Any) -> float | None:
-        """Return a component as a number; a formula has its value at the point."""
-        if not isinstance(component, Expression):
-            return component
-        return float(component(np.array([self.at]))[0])  # type: ignore[attr-defined]
 
 
 @keys_of(Roller)
@@ -476,6 +476,7 @@ class RollerPart(_Named):
     """A surface that slides: displacement prescribed along its normal or another direction."""
 
     changed: ClassVar[str] = "displacement"
+    on_nodes: ClassVar[bool] = True
     kind: Literal["roller"]
     direction: Vector | None = Field(
         None, description="the direction, of any length; the outward normal at every node by default"
@@ -614,6 +615,7 @@ class PreloadAim(Part):
 class ToolPart(_Named):
     """Motion, forces, moments and springs of a rigid tool."""
 
+    beside: ClassVar[tuple[str, ...]] = ("contacts",)
     kind: Literal["tool"]
     value: Motion | None = Field(
         None,
@@ -637,9 +639,7 @@ class ToolPart(_Named):
     def build(self, dim: int, value: tuple[Any, ...]) -> ToolMotion:
         """Return the motion of the tool with motion, force and moment, its own or those of a load step."""
         count = 3 * dim - 3
-        numbers = [
-            float(each(np.zeros((1, dim)))[0]) if isinstance(each, Expression) else each for each in value
-        ]
+        numbers = [at_point(each, np.zeros(dim)) for each in value]
         motion, load = tuple(numbers[:count]), tuple(numbers[count:])
         turned, moment = motion[dim:], load[dim:]
         return self.made(

@@ -78,11 +78,15 @@ class Part(BaseModel):
     Attributes:
         of: The class or function that is called with it.
         given: Those of its arguments that are keys.
+        on_nodes: Whether its surface may be a set of nodes.
+        beside: Keys of parts of the scene that its own check needs.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
     of: ClassVar[Callable[..., Any]]
     given: ClassVar[tuple[str, ...]] = ()
+    on_nodes: ClassVar[bool] = False
+    beside: ClassVar[tuple[str, ...]] = ()
 
     def made(self, **other: Any) -> Any:
         """Build the object of the table, with other values for some arguments."""

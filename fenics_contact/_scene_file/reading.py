@@ -26,10 +26,8 @@ from fenics_contact._optimize.nonlinear import NonlinearConstraint
 from fenics_contact._optimize.progress import Callback
 from fenics_contact._optimize.result import Result
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.fields import read_field
 from fenics_contact._scene.pairs import pressures_of
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.supports import ToolMotion
 from fenics_contact._scene_file.accuracy import not_refined
 from fenics_contact._scene_file.bodies import Shaped
 from fenics_contact._scene_file.design import (
@@ -43,19 +41,18 @@ from fenics_contact._scene_file.design import (
     objective_of,
 )
 from fenics_contact._scene_file.document import Document, load_steps, refused_python
-from fenics_contact._scene_file.model import RigidPart, RollerPart, SupportPart, TriangulationPart
 from fenics_contact._scene_file.source import (
     Mistake,
     SceneFileError,
     Source,
-    branches,
     located,
     parse,
+    parts_of,
     written,
 )
 from fenics_contact._scene_file.source import Path as Keys
 from fenics_contact._scene_file.validation import surface_parts, unknown, validated, wrong_names
-from fenics_contact._scene_file.values import FieldFile, at_time, is_reference, load
+from fenics_contact._scene_file.values import OfFile, at_time, is_reference, load
 from fenics_contact.design.design import SurfaceDesign
 from fenics_contact.design.memory import AdaptiveTolerance
 from fenics_contact.design.objective import Objective
@@ -145,9 +142,7 @@ class Builder:
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):
                     one = self._made(part, dim)
-                    alone: dict[str, Any] = {key: (one,)}
-                    if isinstance(one, ToolMotion):
-                        alone["contacts"] = tuple(built["contacts"])
+                    alone: dict[str, Any] = {each: tuple(built[each]) for each in part.beside} | {key: (one,)}
                     replace(empty, **alone)  # rejects what does not suit the bodies
                     built[key].append(one)
                     with self._at(key, number, *_FORMULAS.get(key, ())):
@@ -176,7 +171,7 @@ class Builder:
     def _check_surfaces(self, bodies: Mapping[str, Body]) -> None:
         for path, part in surface_parts(self._document):
             mesh = bodies[part.body].mesh
-            on_nodes = isinstance(part, SupportPart | RollerPart | RigidPart) or path[0] == "springs"
+            on_nodes = part.on_nodes or path[0] == "springs"
             known = {**mesh.surfaces, **mesh.node_sets} if on_nodes else mesh.surfaces
             if part.surface not in known:
                 what, where = f"a surface of the body {part.body!r}", (*path, "surface")
@@ -204,11 +199,8 @@ def with_fields_read(source: Source, document: AnyDocument, comm: MPI.Comm) -> A
     """
     mistakes: list[Mistake] = []
     read: dict[tuple[Any, ...], Any] = {}
-    for path, part in branches(document):
-        if isinstance(part, FieldFile) and _key(part) not in read:
-            with located(source, path, mistakes):
-                read[_key(part)] = read_field(source.folder / part.file, part.field, comm=comm)
-        if isinstance(part, TriangulationPart) and part.key not in read:
+    for path, part in parts_of(document, OfFile):  # type: ignore[type-abstract]
+        if part.key not in read:
             with located(source, path, mistakes):
                 read[part.key] = part.read(source.folder, comm)
     with together(comm):
@@ -217,24 +209,15 @@ def with_fields_read(source: Source, document: AnyDocument, comm: MPI.Comm) -> A
     return _replaced(document, read) if read else document
 
 
-def _key(part: FieldFile) -> tuple[Any, ...]:
-    return part.file, tuple(part.field) if isinstance(part.field, list) else part.field
-
-
 @singledispatch
 def _replaced(value: Any, read: Mapping[tuple[Any, ...], Any]) -> Any:
     """Return a copy of a part of a document with what was read from files."""
     return value
 
 
-@_replaced.register(FieldFile)
-def _(value: FieldFile, read: Mapping[tuple[Any, ...], Any]) -> Any:
-    return read[_key(value)]
-
-
-@_replaced.register(TriangulationPart)
-def _(value: TriangulationPart, read: Mapping[tuple[Any, ...], Any]) -> Any:
-    return value.of_shape(read[value.key])
+@_replaced.register(OfFile)
+def _(value: OfFile, read: Mapping[tuple[Any, ...], Any]) -> Any:
+    return value.taking(read[value.key])
 
 
 @_replaced.register(BaseModel)

@@ -9,12 +9,13 @@ import ast
 import math
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property, reduce, singledispatch
 from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from pydantic import (
@@ -30,10 +31,13 @@ from pydantic import (
 from pydantic_core import PydanticCustomError, ValidationError
 
 from fenics_contact._base.checks import MOST, run_file
-from fenics_contact._scene.fields import OfPosition
-from fenics_contact._scene_file.source import shortened
+from fenics_contact._scene.fields import OfPosition, read_field
+from fenics_contact._scene_file.source import parts_of, shortened
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import scene_file_code
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 #: Coordinates by name, in the order of the columns of points.
 COORDINATES = ("x", "y", "z")
@@ -199,17 +203,33 @@ def between(start: float | OfPosition, end: float | OfPosition, share: float) ->
     return start + share * (end - start)
 
 
+def formulas(value: Any) -> list[Expression]:
+    """Return the formulas of a value, those of its entries if it has any."""
+    return [part for _, part in parts_of(value, Expression)]
+
+
 def changes(value: Any) -> bool:
     """Return whether a value, or an entry of it, depends on t."""
-    parts = value if isinstance(value, tuple) else (value,)
-    return any(isinstance(part, Expression) and part.changes for part in parts)
+    return any(part.changes for part in formulas(value))
 
 
+@singledispatch
 def at_time(value: Any, time: float) -> Any:
     """Return a value, or all entries of one, at a time."""
-    if isinstance(value, tuple):
-        return tuple(at_time(part, time) for part in value)
-    return replace(value, time=time) if isinstance(value, Expression) and value.changes else value
+    return value
+
+
+at_time.register(Expression, lambda value, time: replace(value, time=time) if value.changes else value)
+at_time.register(tuple, lambda value, time: tuple(at_time(part, time) for part in value))
+
+
+@singledispatch
+def at_point(value: Any, point: Sequence[float] | np.ndarray) -> Any:
+    """Return a number, that of a formula at a point; None if it is None."""
+    return value
+
+
+at_point.register(Expression, lambda value, point: float(value(np.array([point]))[0]))
 
 
 def is_finite(value: float) -> bool:
@@ -221,7 +241,8 @@ def is_finite(value: float) -> bool:
 
 
 def _check(node: ast.expr, text: str, depth: int) -> None:
-    for operation in _from_left(node):
+    operations, first = _from_left(node)
+    for operation in (*operations, first):
         if depth > DEEPEST or not _known(operation):
             part = ast.get_source_segment(text.strip(), operation) or text
             if depth > DEEPEST:
@@ -229,19 +250,29 @@ def _check(node: ast.expr, text: str, depth: int) -> None:
             raise InvalidInputError(
                 f"a formula may hold {ALLOWED}, got {shortened(part)!r} in {shortened(text)!r}: leave it out"
             )
-        left = operation.left if isinstance(operation, ast.BinOp) else None
-        for child in ast.iter_child_nodes(operation):
-            name = isinstance(operation, ast.Call) and child is operation.func
-            if isinstance(child, ast.expr) and child is not left and not name:
-                _check(child, text, depth + 1)
+        for operand in _operands(operation):
+            _check(operand, text, depth + 1)
 
 
-def _from_left(node: ast.expr) -> list[ast.expr]:
-    """Return the operations of a - b + c - ..., each of which is the left operand of the one before."""
-    operations = [node]
-    while isinstance(operations[-1], ast.BinOp):
-        operations.append(operations[-1].left)
-    return operations
+def _from_left(node: ast.expr) -> tuple[list[ast.BinOp], ast.expr]:
+    """Return the operations of a - b + c - ..., each the left operand of the one before, and its first."""
+    operations = []
+    while isinstance(node, ast.BinOp):
+        operations.append(node)
+        node = node.left
+    return operations, node
+
+
+def _operands(node: ast.expr) -> list[ast.expr]:
+    """Return the operands of a known operation without a left one that `_from_left` returns."""
+    match node:
+        case ast.UnaryOp(operand=operand) | ast.BinOp(right=operand):
+            return [operand]
+        case ast.Compare(left=left, comparators=comparators):
+            return [left, *comparators]
+        case ast.Call(args=arguments):
+            return arguments
+    return []
 
 
 def _known(node: ast.expr) -> bool:
@@ -275,10 +306,9 @@ def _value(node: ast.expr, names: dict[str, Any]) -> Any:
         case ast.UnaryOp(operand=operand):
             return _value(operand, names)
         case ast.BinOp():
-            *operations, first = _from_left(node)
+            operations, first = _from_left(node)
             result = _value(first, names)
             for operation in reversed(operations):
-                assert isinstance(operation, ast.BinOp)
                 result = _BINARY[type(operation.op)](result, _value(operation.right, names))
             return result
         case ast.Compare(left=left, ops=[comparison], comparators=[right]):
@@ -416,7 +446,24 @@ def _place_of_file(value: str) -> str:
 PlaceOfFile: TypeAlias = Annotated[str, AfterValidator(_place_of_file)]
 
 
-class FieldFile(BaseModel):
+class OfFile(ABC):
+    """A value that is read from a file, once for all tables that name it alike."""
+
+    @property
+    @abstractmethod
+    def key(self) -> tuple[Any, ...]:
+        """What is read."""
+
+    @abstractmethod
+    def read(self, folder: Path, comm: MPI.Comm) -> Any:
+        """Return it, read on rank 0. Collective."""
+
+    def taking(self, read: Any) -> Any:
+        """Return the value with what was read."""
+        return read
+
+
+class FieldFile(OfFile, BaseModel):
     """A field from a file: values at points, or on the nodes or cells of a mesh."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
@@ -424,6 +471,15 @@ class FieldFile(BaseModel):
     field: str | list[str] | None = Field(
         None, description="name of its column or field, several for a vector; needed if it has others"
     )
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """File and names."""
+        return self.file, repr(self.field)
+
+    def read(self, folder: Path, comm: MPI.Comm) -> Any:
+        """Return the field, read on rank 0. Collective."""
+        return read_field(folder / self.file, self.field, comm=comm)
 
 
 _COUNT = Annotated[int, Field(ge=1, le=MOST)]
@@ -461,10 +517,9 @@ Row: TypeAlias = Annotated[
 
 Formula: TypeAlias = Annotated[Any, Read(Annotated[str, AfterValidator(_formula)])]
 _FIELD = "or a table {file = ..., field = ...}"
+OF_SCALAR = with_message("a finite number, or a formula in x, y and z in quotes")
 #: A number or a formula in x, y, z; a formula becomes an `Expression`, a free component None.
-Scalar: TypeAlias = Annotated[
-    float | Formula, with_message("a finite number, or a formula in x, y and z in quotes")
-]
+Scalar: TypeAlias = Annotated[float | Formula, OF_SCALAR]
 #: A number, a formula or a field from a file.
 ScalarField: TypeAlias = Annotated[
     float | Formula | FieldFile, with_message(f"a finite number, a formula in x, y and z in quotes, {_FIELD}")
