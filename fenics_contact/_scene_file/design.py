@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     Discriminator,
     Field,
     NonNegativeFloat,
@@ -18,10 +21,7 @@ from pydantic import (
 )
 
 from fenics_contact._optimize.bundle_trust import BundleTrust
-from fenics_contact._scene.body import Body
-from fenics_contact._scene.obstacles import DistanceObstacle
-from fenics_contact._scene.pairs import ContactPair
-from fenics_contact._scene.supports import Roller, Support
+from fenics_contact._optimize.nonlinear import NonlinearConstraint
 from fenics_contact._scene_file.bodies import Shaped
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
@@ -32,13 +32,17 @@ from fenics_contact._scene_file.values import (
     Row,
     Vector,
     is_reference,
+    load,
     one_of,
     with_message,
 )
 from fenics_contact.design import objective as objective_module
 from fenics_contact.design import objectives as objectives_module
 from fenics_contact.design.objective import Objective
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.design.problem import ShapeProblem
+from fenics_contact.design.several import LoadPath
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.kinds import scene_file_code
 from fenics_contact.gallery.links import DesignSurface
 from fenics_contact.gallery.side import side_of
 
@@ -59,6 +63,10 @@ class ObjectivePart(Part):
         """Its name, with a weight other than one."""
         kind: str = self.kind  # type: ignore[attr-defined]
         return kind if self.weight == 1.0 else f"{self.weight:g} {kind}"
+
+    def found(self, folder: Path) -> Objective:
+        """Return the objective of a scene file in a folder."""
+        return self.objective
 
 
 #: Objectives that need no more than their names.
@@ -107,55 +115,111 @@ def _form(value: Any) -> str:
     return f"{MARK}{'table' if table else 'list' if several else 'own' if is_reference(value) else 'name'}"
 
 
+class SumOfParts(list[ObjectivePart]):
+    """The sum of several objectives."""
+
+    @property
+    def in_words(self) -> str:
+        """The names with their weights."""
+        return " + ".join(part.in_words for part in self)
+
+    def found(self, folder: Path) -> Objective:
+        """Return the objective of a scene file in a folder."""
+        return objective_module.WeightedSum(tuple((part.weight, part.made()) for part in self))
+
+
+@dataclass(frozen=True)
+class OwnObjective:
+    """An object of a Python file, "file.py:NAME"."""
+
+    reference: str
+
+    @property
+    def in_words(self) -> str:
+        """The reference."""
+        return self.reference
+
+    def found(self, folder: Path) -> Objective:
+        """Return the object; runs the file, which is relative to the folder."""
+        given: Any = load(self.reference, folder)
+        with scene_file_code(f"objective {self.reference!r}"):
+            missing = [part for part in ("value", "partials") if not hasattr(given, part)]
+        if missing or isinstance(given, type):
+            raise InvalidInputError(
+                f"objective {self.reference!r} must be an object with value and partials, got {given!r}: "
+                "give an instance"
+            )
+        objective: Objective = given
+        return objective
+
+
+def _named(name: str) -> ObjectivePart:
+    return BY_NAME[name](kind=name)  # type: ignore[call-arg]
+
+
 #: A name, that of an object in a Python file, a table, or a list of tables, the sum of which is meant.
 AnyObjective: TypeAlias = Annotated[
     Any,
     Read(
         Annotated[
-            Annotated[Literal[tuple(BY_NAME)], Tag(f"{MARK}name")]  # type: ignore[valid-type]
-            | Annotated[str, Field(pattern=r"\.py:"), Tag(f"{MARK}own")]
+            Annotated[Literal[tuple(BY_NAME)], AfterValidator(_named), Tag(f"{MARK}name")]  # type: ignore[valid-type]
+            | Annotated[str, Field(pattern=r"\.py:"), AfterValidator(OwnObjective), Tag(f"{MARK}own")]
             | Annotated[_ANY, Tag(f"{MARK}table")]
-            | Annotated[list[_ANY], Field(min_length=1), Tag(f"{MARK}list")],
+            | Annotated[list[_ANY], Field(min_length=1), AfterValidator(SumOfParts), Tag(f"{MARK}list")],
             Discriminator(_form),
         ]
     ),
 ]
 
 
-def in_words(given: Any) -> str:
-    """Return an objective of a scene file for a line of text."""
-    if isinstance(given, str):
-        return given
-    return " + ".join(part.in_words for part in given) if isinstance(given, list) else str(given.in_words)
+def _limits(part: VolumeConstraint | ObjectiveConstraint, unit: float = 1.0) -> tuple[float, float]:
+    """Return the upper and the lower limit, infinite where it is not given."""
+    return (
+        np.inf if part.at_most is None else part.at_most * unit,
+        -np.inf if part.at_least is None else part.at_least * unit,
+    )
 
 
-def objective_of(given: Any) -> Objective:
-    """Return the objective of a scene file, unless it is the user's own."""
-    if isinstance(given, str):
-        return BY_NAME[given](kind=given).objective  # type: ignore[call-arg]
-    if isinstance(given, list):
-        return objective_module.WeightedSum(tuple((part.weight, part.made()) for part in given))
-    objective: Objective = given.objective
-    return objective
+class _Constraint(Part):
+    def rows(self, size: int) -> list[tuple[np.ndarray, float]]:
+        """Return coefficients and largest values of sums of design variables."""
+        return []
+
+    def limits(
+        self, problem: ShapeProblem | LoadPath, start: np.ndarray, folder: Path
+    ) -> list[NonlinearConstraint]:
+        """Return limits of other functions of the design. Collective."""
+        return []
 
 
-class VolumeConstraint(Part):
+class VolumeConstraint(_Constraint):
     """The volume of the designed bodies relative to that of the start."""
 
     kind: Literal["volume"]
     at_least: PositiveFloat | None = Field(None, description="least volume relative to that of the start")
     at_most: PositiveFloat | None = Field(None, description="largest volume relative to that of the start")
 
+    def limits(
+        self, problem: ShapeProblem | LoadPath, start: np.ndarray, folder: Path
+    ) -> list[NonlinearConstraint]:
+        """Return the limits of the volume. Collective."""
+        upper, lower = _limits(self, problem.volume(start)[0])
+        return [NonlinearConstraint(problem.volume, upper, lower, "volume")]
 
-class LinearConstraint(Part):
+
+class LinearConstraint(_Constraint):
     """A linear function of the design variables."""
 
     kind: Literal["linear"]
     coefficients: Row = Field(description="one for each design variable")
     at_most: float = Field(description="largest value of the sum of coefficients times variables")
 
+    def rows(self, size: int) -> list[tuple[np.ndarray, float]]:
+        """Return the coefficients and the largest value."""
+        return [(fitting("coefficients", self.coefficients, size), self.at_most)]
 
-class ObjectiveConstraint(Part):
+
+class ObjectiveConstraint(_Constraint):
     """Limits of another objective, such as a stress or a movement."""
 
     kind: Literal["objective"]
@@ -164,6 +228,18 @@ class ObjectiveConstraint(Part):
     at_most: float | None = Field(None, description="largest value; equal to at_least for an equality")
     step: Line | None = Field(None, description="load step after which it holds; the last by default")
     name: Line = Field("", description="its name in results")
+
+    def limits(
+        self, problem: ShapeProblem | LoadPath, start: np.ndarray, folder: Path
+    ) -> list[NonlinearConstraint]:
+        """Return the limits of the objective. Collective."""
+        with together(problem.comm):
+            objective = self.objective.found(folder)
+        name = self.name or self.objective.in_words
+        if isinstance(problem, LoadPath):
+            step = self.step or list(problem.problems)[-1]
+            return [NonlinearConstraint(problem.function({step: objective}), *_limits(self), name)]
+        return [NonlinearConstraint(problem.function(objective, name), *_limits(self), name)]
 
 
 Constraint: TypeAlias = Annotated[
@@ -198,6 +274,7 @@ class DesignPart(Part):
         "total_potential",
         description="what is minimised: a name, a table with its kind and arguments, a list of tables, which "
         'are added, or "file.py:NAME", an Objective',
+        validate_default=True,
     )
     over_steps: list[Line] | None = Field(
         None,
@@ -219,7 +296,16 @@ class DesignPart(Part):
     @property
     def objective_in_words(self) -> str:
         """The objective for a line of text."""
-        return in_words(self.objective)
+        return str(self.objective.in_words)
+
+
+def fitting(name: str, values: tuple[float, ...], size: int) -> np.ndarray:
+    """Return values as an array, which must have one for each design variable."""
+    if len(values) != size:
+        raise InvalidInputError(
+            f"{name} must have {size} entries, one per design variable, got {len(values)}"
+        )
+    return np.array(values)
 
 
 def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
@@ -230,34 +316,3 @@ def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
         return side_of(shape.mesh, surface)
     except InvalidInputError as error:
         raise InvalidInputError(f"body {body!r}: {error}") from error
-
-
-def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
-    """Evaluate the formulas of a support, load or pair at the nodes, as solvers will."""
-    if isinstance(part, Support):
-        if any(map(callable, part.value)):
-            part.values(_nodes(bodies[part.body], part.surface))
-    elif isinstance(part, Roller):
-        if callable(part.displacement):
-            part.amounts(_nodes(bodies[part.body], part.surface))
-    elif isinstance(part, ContactPair):
-        if isinstance(part.master, DistanceObstacle):
-            part.master.distance(_nodes(bodies[part.slave.body], part.slave.name))
-    elif callable(value := getattr(part, "value", None)):
-        body = bodies[part.body]
-        named = getattr(part, "surface", getattr(part, "nodes", None))
-        value(body.mesh.points if named is None else _nodes(body, named))
-
-
-def check_pair(pair: ContactPair, key: str, bodies: Mapping[str, Body]) -> None:
-    """Evaluate the friction, gap or interference of a pair, whichever the key is, at the slave's nodes."""
-    nodes = _nodes(bodies[pair.slave.body], pair.slave.name)
-    if key == "friction":
-        pair.friction_at(nodes)
-        pair.limit_at(nodes)
-    elif getattr(pair, key) is not None:
-        pair.gap_at(nodes)
-
-
-def _nodes(body: Body, surface: str) -> np.ndarray:
-    return np.asarray(body.mesh.points[body.mesh.nodes_of(surface)])

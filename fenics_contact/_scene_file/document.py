@@ -17,7 +17,7 @@ from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene_file.accuracy import AccuracyPart
 from fenics_contact._scene_file.bodies import AnyMaterial, Mesh
-from fenics_contact._scene_file.design import DesignPart, check_formulas
+from fenics_contact._scene_file.design import DesignPart, OwnObjective
 from fenics_contact._scene_file.model import (
     AnyLoad,
     AnySupportPart,
@@ -30,8 +30,8 @@ from fenics_contact._scene_file.model import (
     PreloadPart,
     SpringPart,
 )
-from fenics_contact._scene_file.part import Part, values_of
-from fenics_contact._scene_file.source import Mistake, Source, as_toml, written
+from fenics_contact._scene_file.part import Part
+from fenics_contact._scene_file.source import Mistake, Source, as_toml, parts_of, written
 from fenics_contact._scene_file.source import Path as Keys
 from fenics_contact._scene_file.values import (
     Line,
@@ -120,7 +120,7 @@ class SolverPart(Part):
     method: Literal["auto", "face_newton", "smalse", "projected_cg"] = Field(
         default="auto", description="dual solver; auto takes the one that suits the scene"
     )
-    tolerance: Annotated[float | str, Read(_Tolerance)] = Field(
+    tolerance: Annotated[Any, Read(_Tolerance)] = Field(
         default=BALANCED,
         description="largest relative residual, or balanced: as accurate as the mesh deserves",
     )
@@ -143,13 +143,18 @@ class SolverPart(Part):
         """Return the tolerance for solvers; None, their own, where errors of the mesh are not estimated."""
         if scene.is_nonlinear and "tolerance" not in self.model_fields_set:
             return None
-        if isinstance(self.tolerance, float):
-            return self.tolerance
+        if self.tolerance != BALANCED:
+            return float(self.tolerance)
         from fenics_contact._accuracy.state_errors import (
             BalancedTolerance,
         )  # not imported for a fixed tolerance
 
         return BalancedTolerance()
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """The tolerance where it is a number, for what has one of its own for a balanced one."""
+        return {} if self.tolerance == BALANCED else {"tolerance": self.tolerance}
 
     def chosen(self, scene: Scene, partitions: Mapping[str, np.ndarray]) -> DualSolver | None:
         """Return the dual solver given by the keys, None for the default one."""
@@ -292,8 +297,9 @@ def load_steps(
                 built.append(
                     LoadStep(name, acts, holds, time, drawn, pressures or None, constraints=values or None)
                 )
-            for part in (*acted.at(time, 1.0), *held_up.at(time, 1.0)):
-                check_formulas(part, bodies)
+            for history in (acted, held_up):
+                for part, made in zip(history.parts, history.at(time, 1.0), strict=True):
+                    part.check_formulas(made, bodies)
         held.reach(step.supports)
         acting.reach(step.loads)
         wetting.update(step.fluids)
@@ -476,9 +482,8 @@ def references(document: Document) -> Iterator[tuple[Keys, str]]:
             yield ("materials", name, "model"), material.model
     if document.accuracy is not None and is_reference(document.accuracy.quantity):
         yield ("accuracy", "quantity"), document.accuracy.quantity
-    for path, objective in values_of(document.design, "objective", ("design",)):
-        if is_reference(objective):
-            yield path, objective
+    for path, objective in parts_of(document.design, OwnObjective, ("design",)):
+        yield path, objective.reference
 
 
 def refused_python(source: Source, document: Document) -> list[Mistake]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
@@ -55,6 +56,14 @@ from fenics_contact.shapes.triangulation import Triangulation
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+    from fenics_contact._scene.body import Body
+
+
+def nodes_of(bodies: Mapping[str, Body], body: str, surface: str) -> np.ndarray:
+    """Return the nodes of a surface, shape (n, dim)."""
+    mesh = bodies[body].mesh
+    return np.asarray(mesh.points[mesh.nodes_of(surface)])
 
 
 @dataclass(frozen=True)
@@ -273,6 +282,20 @@ class ContactPart(_PairPart):
         "one that the geometry has, which counts as a mistake otherwise"
     )
 
+    def check_formulas(self, made: ContactPair, bodies: Mapping[str, Body]) -> None:
+        """Evaluate the distance of an obstacle that is a formula."""
+        if isinstance(made.master, obstacles_module.DistanceObstacle):
+            made.master.distance(nodes_of(bodies, made.slave.body, made.slave.name))
+
+    def check_values(self, made: ContactPair, key: str, bodies: Mapping[str, Body]) -> None:
+        """Evaluate friction, gap or interference, whichever the key is, at the slave's nodes."""
+        nodes = nodes_of(bodies, made.slave.body, made.slave.name)
+        if key == "friction":
+            made.friction_at(nodes)
+            made.limit_at(nodes)
+        elif getattr(made, key) is not None:
+            made.gap_at(nodes)
+
 
 @keys_of(automatic.AutomaticContact)
 class AutomaticPart(Part):
@@ -433,6 +456,11 @@ class SupportPart(_Named):
         "a formula in x, y, z in quotes, or a field from a file; zero in all directions by default",
     )
 
+    def check_formulas(self, made: Support, bodies: Mapping[str, Body]) -> None:
+        """Evaluate the components that are formulas."""
+        if any(map(callable, made.value)):
+            made.values(nodes_of(bodies, made.body, made.surface))
+
     def build(self, dim: int, value: tuple[Any, ...] | None) -> Support:
         """Return the support with a value, its own or that of a load step."""
         return self.made(value=value or (0.0, 0.0, 0.0))
@@ -494,6 +522,11 @@ class RollerPart(_Named):
         if callable(made.direction):
             raise not_in_files(f"no directions that differ from node to node, as {made.in_words} has")
         return super().written(made)
+
+    def check_formulas(self, made: Roller, bodies: Mapping[str, Body]) -> None:
+        """Evaluate a displacement that is a formula."""
+        if callable(made.displacement):
+            made.amounts(nodes_of(bodies, made.body, made.surface))
 
     def build(self, dim: int, value: Any) -> Roller:
         """Return the roller with a displacement, its own or that of a load step."""

@@ -5,7 +5,17 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import singledispatch
-from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    TypeVar,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, create_model, model_validator
 from pydantic.fields import FieldInfo
@@ -30,6 +40,9 @@ from fenics_contact._scene_file.values import (
 )
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.temperature_dependent import ByTemperature
+
+if TYPE_CHECKING:
+    from fenics_contact._scene.body import Body
 
 _FORMULAS = "; numbers, formulas in x, y, z in quotes, or fields from files"
 SixNumbers = tuple[float, float, float, float, float, float]
@@ -92,6 +105,13 @@ class Part(BaseModel):
         """Build the object of the table, with other values for some arguments."""
         own = {name: built(getattr(self, name)) for name in self.given}
         return type(self).of(**{**own, **other})
+
+    def check_formulas(self, made: Any, bodies: Mapping[str, Body]) -> None:
+        """Evaluate the formulas of the object of the table at nodes, as solvers will."""
+        if callable(value := getattr(made, "value", None)):
+            body = bodies[made.body]
+            named = getattr(made, "surface", getattr(made, "nodes", None))
+            value(body.mesh.points if named is None else body.mesh.points[body.mesh.nodes_of(named)])
 
     @classmethod
     def describes(cls, made: object) -> bool:

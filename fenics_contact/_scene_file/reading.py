@@ -32,13 +32,9 @@ from fenics_contact._scene_file.accuracy import not_refined
 from fenics_contact._scene_file.bodies import Shaped
 from fenics_contact._scene_file.design import (
     DesignPart,
-    ObjectiveConstraint,
-    VolumeConstraint,
-    check_formulas,
-    check_pair,
+    OwnObjective,
     design_surface,
-    in_words,
-    objective_of,
+    fitting,
 )
 from fenics_contact._scene_file.document import Document, load_steps, refused_python
 from fenics_contact._scene_file.source import (
@@ -52,14 +48,13 @@ from fenics_contact._scene_file.source import (
 )
 from fenics_contact._scene_file.source import Path as Keys
 from fenics_contact._scene_file.validation import surface_parts, unknown, validated, wrong_names
-from fenics_contact._scene_file.values import OfFile, at_time, is_reference, load
+from fenics_contact._scene_file.values import OfFile, at_time, is_reference
 from fenics_contact.design.design import SurfaceDesign
 from fenics_contact.design.memory import AdaptiveTolerance
 from fenics_contact.design.objective import Objective
 from fenics_contact.design.problem import ShapeProblem
 from fenics_contact.design.several import LoadPath
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.errors.kinds import scene_file_code
 from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.materials.elastic import Material
 from fenics_contact.results.state import State
@@ -146,10 +141,10 @@ class Builder:
                     replace(empty, **alone)  # rejects what does not suit the bodies
                     built[key].append(one)
                     with self._at(key, number, *_FORMULAS.get(key, ())):
-                        check_formulas(one, bodies)
+                        part.check_formulas(one, bodies)
                     for name in ("friction", "gap", "interference") if key == "contacts" else ():
                         with self._at(key, number, name):
-                            check_pair(one, name, bodies)
+                            part.check_values(one, name, bodies)
         self._check()
         if document.automatic_contact is None:
             return Scene(bodies, **built)
@@ -312,7 +307,7 @@ def shape_task(
         for part in design.surfaces
     )
     with together(contact.comm):
-        objective = _objective(design.objective, source)
+        objective = design.objective.found(source.folder)
     adaptive = AdaptiveTolerance() if design.adaptive else None
     alone = ShapeProblem(contact, moving, objective, tolerance=adaptive)
     problem = _over_steps(alone, design, steps)
@@ -320,9 +315,9 @@ def shape_task(
         np.repeat([getattr(part, side) for part in design.surfaces], [move.size for move in moving])
         for side in ("lower", "upper")
     )
-    start = np.zeros(problem.size) if design.start is None else _fitting("start", design.start, problem.size)
+    start = np.zeros(problem.size) if design.start is None else fitting("start", design.start, problem.size)
     method = design.made(raise_on_failure=False)
-    constrain = partial(_constraints, design, start=start, source=source)
+    constrain = partial(_constraints, design, start=start, folder=source.folder)
     constraints = constrain(problem)
     return ShapeTask(problem, start, (lower, upper), constraints, constrain, method, design.restore)
 
@@ -340,66 +335,16 @@ def _over_steps(
     return LoadPath(problem, steps, dict.fromkeys(design.over_steps, problem.objective))
 
 
-def _objective(name: Any, source: Source) -> Objective:
-    if not is_reference(name):
-        return objective_of(name)
-    given: Any = load(name, source.folder)
-    with scene_file_code(f"objective {name!r}"):
-        missing = [part for part in ("value", "partials") if not hasattr(given, part)]
-    if missing or isinstance(given, type):
-        raise InvalidInputError(
-            f"objective {name!r} must be an object with value and partials, got {given!r}: give an instance"
-        )
-    objective: Objective = given
-    return objective
-
-
 def _constraints(
-    design: DesignPart, problem: ShapeProblem | LoadPath, start: np.ndarray, source: Source
+    design: DesignPart, problem: ShapeProblem | LoadPath, start: np.ndarray, folder: Path
 ) -> tuple[LinearConstraints | NonlinearConstraint, ...]:
     """Return the constraints of a design, all linear ones in one. Collective."""
-    rows: list[np.ndarray] = []
-    limits: list[float] = []
-    others: list[NonlinearConstraint] = []
-    for part in design.constraints:
-        if isinstance(part, VolumeConstraint):
-            upper, lower = _limits(part, problem.volume(start)[0])
-            others.append(NonlinearConstraint(problem.volume, upper, lower, "volume"))
-        elif isinstance(part, ObjectiveConstraint):
-            others.append(_limited(part, problem, source))
-        else:
-            rows.append(_fitting("coefficients", part.coefficients, problem.size))
-            limits.append(part.at_most)
-    return (*([LinearConstraints(np.array(rows), np.array(limits))] if rows else []), *others)
-
-
-def _limited(
-    part: ObjectiveConstraint, problem: ShapeProblem | LoadPath, source: Source
-) -> NonlinearConstraint:
-    """Return the limits of an objective. Collective."""
-    with together(problem.comm):
-        objective = _objective(part.objective, source)
-    name = part.name or in_words(part.objective)
-    if isinstance(problem, LoadPath):
-        step = part.step or list(problem.problems)[-1]
-        return NonlinearConstraint(problem.function({step: objective}), *_limits(part), name)
-    return NonlinearConstraint(problem.function(objective, name), *_limits(part), name)
-
-
-def _limits(part: VolumeConstraint | ObjectiveConstraint, unit: float = 1.0) -> tuple[float, float]:
-    """Return the upper and the lower limit, infinite where it is not given."""
-    return (
-        np.inf if part.at_most is None else part.at_most * unit,
-        -np.inf if part.at_least is None else part.at_least * unit,
-    )
-
-
-def _fitting(name: str, values: tuple[float, ...], size: int) -> np.ndarray:
-    if len(values) != size:
-        raise InvalidInputError(
-            f"{name} must have {size} entries, one per design variable, got {len(values)}"
-        )
-    return np.array(values)
+    rows = [row for part in design.constraints for row in part.rows(problem.size)]
+    others = [limit for part in design.constraints for limit in part.limits(problem, start, folder)]
+    if not rows:
+        return tuple(others)
+    coefficients, largest = zip(*rows, strict=True)
+    return LinearConstraints(np.array(coefficients), np.array(largest)), *others
 
 
 #: Largest size of a scene file, in bytes.
@@ -543,7 +488,7 @@ class SceneFile:
         assert asked is not None
         with self._at("accuracy"), together(self.comm):
             if is_reference(asked.quantity):
-                return _objective(asked.quantity, self.source)
+                return OwnObjective(asked.quantity).found(self.source.folder)
             return quantity(asked.quantity, self.scene, **asked.where)
 
     def solve_to(self, callback: Callable[[Level], None] | None = None) -> AccurateResult:
@@ -565,7 +510,7 @@ class SceneFile:
             limits=limits,
             solver=solver,
             callback=callback,
-            **({"tolerance": given} if isinstance(given := self.document.solver.tolerance, float) else {}),
+            **self.document.solver.fixed,
         )
 
     def require_design(self) -> None:
@@ -626,13 +571,21 @@ def read_scene_file(
     return SceneFile(source, document, comm)
 
 
-def _source(scene: str | Path | Mapping[str, Any], comm: MPI.Comm) -> Source:
-    if isinstance(scene, Mapping):
-        return Source("the scene", Path(), scene)
-    if not isinstance(scene, str | Path):
-        raise InvalidInputError(
-            f"a scene must be the path of a TOML file or a dictionary, got {type(scene).__name__}"
-        )
+@singledispatch
+def _source(scene: object, comm: MPI.Comm) -> Source:
+    raise InvalidInputError(
+        f"a scene must be the path of a TOML file or a dictionary, got {type(scene).__name__}"
+    )
+
+
+@_source.register(Mapping)
+def _(scene: Mapping[str, Any], comm: MPI.Comm) -> Source:
+    return Source("the scene", Path(), scene)
+
+
+@_source.register(str)
+@_source.register(Path)
+def _(scene: str | Path, comm: MPI.Comm) -> Source:
     path = Path(scene)
     return parse(on_root_then_bcast(comm, lambda: _text_of(path)), path.name, path.parent)
 

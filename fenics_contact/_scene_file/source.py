@@ -325,9 +325,9 @@ class SceneFileError(InvalidInputError):
             super().__init__(f"{name} has {len(ordered)} mistakes:{lines}{more}")
 
 
-def suggestion(given: str, allowed: Iterable[str]) -> str:
-    """Return "did you mean ...? " if an allowed name is close to the one given, else ""."""
-    close = get_close_matches(given, list(allowed), n=1, cutoff=0.6)
+def suggestion(given: object, allowed: Iterable[str]) -> str:
+    """Return "did you mean ...? " if an allowed name is close to the text given, else ""."""
+    close = get_close_matches(given, list(allowed), n=1, cutoff=0.6) if isinstance(given, str) else []
     return f"did you mean {close[0]!r}? " if close else ""
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from functools import singledispatch
+from types import NoneType
 from typing import Any
 
 from pydantic import ValidationError
@@ -154,19 +156,34 @@ def _unlike(source: Source, document: Document) -> Iterator[Mistake]:
 
 
 def _alike(own: Any, value: Any) -> bool:
-    """Return whether values have the same components; those of a field from a file are not known yet."""
-    return isinstance(own, FieldFile) or isinstance(value, FieldFile) or _form(own) == _form(value)
+    """Return whether values have the same components."""
+    forms = _form(own), _form(value)
+    return forms[0] == forms[1] or _UNKNOWN in forms
 
 
+#: Form of a field from a file that is not read yet.
+_UNKNOWN = "unknown"
+
+
+@singledispatch
 def _form(value: Any) -> Any:
-    return tuple(entry is None for entry in value) if isinstance(value, tuple) else None
+    """Return which components of a value are free, None for a value without components."""
+    return None
 
 
+_form.register(tuple, lambda value: tuple(entry is None for entry in value))
+_form.register(FieldFile, lambda value: _UNKNOWN)
+
+
+@singledispatch
 def _plain(value: Any) -> Any:
     """Return a value as in the file."""
-    if isinstance(value, tuple):
-        return [FREE if entry is None else _plain(entry) for entry in value]
-    return value.text if isinstance(value, Expression) else value
+    return value
+
+
+_plain.register(NoneType, lambda value: FREE)
+_plain.register(Expression, lambda value: value.text)
+_plain.register(tuple, lambda value: list(map(_plain, value)))
 
 
 def json_schema() -> dict[str, Any]:
@@ -253,7 +270,7 @@ def _mistake(source: Source, error: Any) -> Mistake:
     value = value_at(source.data, path)
     if kind == "literal_error":
         allowed = re.findall("'([^']*)'", context["expected"])
-        meant = suggestion(value if isinstance(value, str) else "", allowed)
+        meant = suggestion(value, allowed)
         hint = f": {meant}".rstrip(": ") + (hint and f" ({hint[2:]})")
         needed = f"one of {listed(allowed)}"
     elif kind == "float_type" and isinstance(value, int) and not isinstance(value, bool):
@@ -289,6 +306,6 @@ def _wrong_choice(source: Source, path: Path, key: str, *allowed: str) -> Mistak
         words = f"{written(path)} must have {key!r}, one of {listed(allowed)}, got only {', '.join(table)}"
         return source.mistake(path, words if table else words.replace("only ", "nothing"))
     given = table[key]
-    meant = suggestion(given if isinstance(given, str) else "", allowed).rstrip()
+    meant = suggestion(given, allowed).rstrip()
     words = f"{written((*path, key))} must be one of {listed(allowed)}, got {as_toml(given)}"
     return source.mistake((*path, key), f"{words}: {meant}" if meant else words)
