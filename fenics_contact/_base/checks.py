@@ -33,7 +33,7 @@ STEEPEST = 8.0
 
 def check_count(value: int, name: str, least: int = 1) -> None:
     """Reject a count that is not an integer from ``least`` to `MOST`."""
-    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
+    if not _is_one(value, int) or value < least:
         raise InvalidInputError(f"{name} must be an integer of at least {least}, got {brief(value)}")
     if value > MOST:
         raise InvalidInputError(f"{name} must be at most {MOST}, got {brief(value)}: choose a smaller count")
@@ -55,7 +55,7 @@ def check_grading(value: Any) -> None:
 
 def check_row(values: Any, name: str, count: int) -> None:
     """Reject a value that is not a sequence of ``count`` finite numbers."""
-    known = isinstance(values, Sequence | np.ndarray) and np.ndim(values) == 1 and len(values) == count
+    known = _is_one(values, Sequence) and np.ndim(values) == 1 and len(values) == count
     if not known or not all(map(_is_number, values)):
         raise InvalidInputError(
             f"{name} must be {count} finite numbers of less than {LARGEST:g}, got {brief(values)}: give them"
@@ -81,8 +81,7 @@ def brief(value: Any) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    return real and -LARGEST < value < LARGEST
+    return _is_one(value, float) and -LARGEST < value < LARGEST
 
 
 Class = TypeVar("Class", bound=type)

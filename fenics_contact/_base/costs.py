@@ -6,7 +6,7 @@ import pickle
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cache
+from functools import cache, singledispatch
 from typing import Any, cast
 
 import numpy as np
@@ -232,6 +232,7 @@ def count_messages(comm: MPI.Comm, exchange: tuple[int, int]) -> None:
         ledger.add("message_bytes", exchange[1])
 
 
+@singledispatch
 def size_of(data: Any) -> int:
     """Return the bytes of what is sent: of arrays their entries, of objects what pickle makes of them.
 
@@ -239,13 +240,14 @@ def size_of(data: Any) -> int:
         >>> size_of(np.zeros(10)), size_of(1.0)
         (80, 8)
     """
-    if isinstance(data, np.ndarray):
-        return data.nbytes
-    if isinstance(data, bool | int | float | np.generic):
-        return 8
     arrays: list[pickle.PickleBuffer] = []  # which are not copied
     words = pickle.dumps(data, 5, buffer_callback=arrays.append)
     return len(words) + sum(part.raw().nbytes for part in arrays)
+
+
+size_of.register(np.ndarray, lambda data: data.nbytes)
+for _number in (int, float, np.generic):
+    size_of.register(_number, lambda data: 8)
 
 
 @cache

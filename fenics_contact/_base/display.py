@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, fields, is_dataclass
-from enum import Enum
-from typing import Any, TypeVar
+from enum import Enum, IntEnum
+from functools import singledispatch
+from types import NoneType
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -172,46 +174,72 @@ def _facts(shown: Any) -> Mapping[str, Any]:
     return {field.name: getattr(shown, field.name) for field in fields(shown) if field.repr}
 
 
-def in_short(value: Any, width: int = INSIDE, *, inside: bool = False) -> str:
+def in_short(value: Any, width: int = INSIDE) -> str:
     """Return a value in one line: arrays by shape and range, long lists by their length."""
-    return _cut(" ".join(_words(value, inside).split()), width)
+    return _in_line(value, _object, width)
+
+
+#: What is said of an object that is no number, text, array, list or mapping.
+OfObject: TypeAlias = Callable[[Any], str]
+
+
+def _in_line(value: Any, of_object: OfObject, width: int = INSIDE) -> str:
+    return _cut(" ".join(_words(value, of_object).split()), width)
 
 
 def _cut(text: str, width: int) -> str:
     return text if len(text) <= width else f"{text[: width - 2]} …"
 
 
-def _words(value: Any, inside: bool) -> str:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, Enum):
-        return value.name
-    if isinstance(value, float | np.floating):
-        return f"{value:.6g}"
-    if isinstance(value, np.ndarray):
-        return _array(value)
-    if isinstance(value, Mapping):
-        parts = [f"{name}: {in_short(part, inside=inside)}" for name, part in list(value.items())[:ENTRIES]]
-        return "; ".join(parts + _more(len(value))) or "none"
-    if isinstance(value, list | tuple | Set):
-        return _sequence(value, inside)
+@singledispatch
+def _words(value: Any, of_object: OfObject) -> str:
     if callable(value) and hasattr(value, "__qualname__"):
         return str(value.__qualname__)
-    if type(value).__repr__ is in_lines or is_dataclass(value):
-        return _object(value, inside)
-    if isinstance(value, int | None):
+    return of_object(value)
+
+
+_words.register(str, lambda value, of_object: value)
+_kind: type
+for _kind in (float, np.floating):
+    _words.register(_kind, lambda value, of_object: f"{value:.6g}")
+for _kind in (int, NoneType):
+    _words.register(_kind, lambda value, of_object: repr(value))
+for _kind in (Enum, IntEnum):
+    _words.register(_kind, lambda value, of_object: value.name)
+
+
+@_words.register(Mapping)
+def _(value: Mapping[Any, Any], of_object: OfObject) -> str:
+    parts = [f"{name}: {_in_line(part, of_object)}" for name, part in list(value.items())[:ENTRIES]]
+    return "; ".join(parts + _more(len(value))) or "none"
+
+
+@_words.register(list)
+@_words.register(tuple)
+@_words.register(Set)
+def _(values: Sequence[Any] | Set[Any], of_object: OfObject) -> str:
+    kinds = {type(value).__name__ for value in values}
+    if len(values) > ENTRIES and len(kinds) == 1 and kinds != {"str"}:
+        return f"{len(values)} × {kinds.pop()}"
+    shown = [_in_line(value, of_object) for value in list(values)[:ENTRIES]] + _more(len(values))
+    numbers = all(isinstance(value, int | float | np.number | None) for value in values)
+    return f"({', '.join(shown)})" if values and numbers else "; ".join(shown) or "none"
+
+
+def _object(value: Any) -> str:
+    """Return the facts of an object that shows them, or what it says itself."""
+    if type(value).__repr__ is not in_lines and not is_dataclass(value):
         return repr(value)
-    return f"{type(value).__name__}(…)" if inside else repr(value)
-
-
-def _object(value: Any, inside: bool) -> str:
-    if inside:
-        return f"{type(value).__name__}(…)"
-    parts = (f"{name} {in_short(fact, inside=True)}" for name, fact in _facts(value).items())
+    parts = (f"{name} {_in_line(fact, _named)}" for name, fact in _facts(value).items())
     return f"{type(value).__name__}({', '.join(parts)})"
 
 
-def _array(array: np.ndarray) -> str:
+def _named(value: Any) -> str:
+    return f"{type(value).__name__}(…)"
+
+
+@_words.register(np.ndarray)
+def _(array: np.ndarray, of_object: OfObject) -> str:
     known = f"{array.dtype} {array.shape}"
     if array.size == 0 or array.dtype.kind not in "biuf":
         return known
@@ -220,15 +248,6 @@ def _array(array: np.ndarray) -> str:
     nan = int(np.count_nonzero(np.isnan(array)))
     low, high = (np.nan, np.nan) if nan == array.size else (np.nanmin(array), np.nanmax(array))
     return f"{known}, {low:.6g} to {high:.6g}{f', {nan} nan' if nan else ''}"
-
-
-def _sequence(values: Sequence[Any] | Set[Any], inside: bool) -> str:
-    kinds = {type(value).__name__ for value in values}
-    if len(values) > ENTRIES and len(kinds) == 1 and kinds != {"str"}:
-        return f"{len(values)} × {kinds.pop()}"
-    shown = [in_short(value, inside=inside) for value in list(values)[:ENTRIES]] + _more(len(values))
-    numbers = all(isinstance(value, int | float | np.number | None) for value in values)
-    return f"({', '.join(shown)})" if values and numbers else "; ".join(shown) or "none"
 
 
 def _more(count: int) -> list[str]:

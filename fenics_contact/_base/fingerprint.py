@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from enum import Enum
-from functools import partial
+from enum import Enum, IntEnum, StrEnum
+from functools import partial, singledispatch
 from pathlib import PurePath
-from types import FunctionType
-from typing import TYPE_CHECKING, Any
+from types import FunctionType, NoneType
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 MOST_NAMED = 4
 
 
-def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
+#: Words on a value and its parts by name.
+Parts: TypeAlias = tuple[str, list[tuple[str, Any]]]
+
+
+def described(value: Any, name: str) -> dict[str, str]:
     """Describe a value by its parts: one entry for each number, text or array.
 
     Arrays are described by shape, type and a hash of their bits, dataclasses, mappings and sequences by their
@@ -35,7 +39,14 @@ def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
         {'beam': '1 entries', "beam['length']": '2.0'}
     """
     parts: dict[str, str] = {}
-    _describe(value, name, parts, (), carried)
+    _describe(value, name, parts, (), _parts)
+    return parts
+
+
+def described_by_names(value: Any, name: str) -> dict[str, str]:
+    """Describe a value as `described` does, but functions by their names alone."""
+    parts: dict[str, str] = {}
+    _describe(value, name, parts, (), _parts_but_of_functions)
     return parts
 
 
@@ -50,50 +61,71 @@ def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
 
 
 def _describe(
-    value: Any, name: str, descriptions: dict[str, str], around: tuple[int, ...], carried: bool
+    value: Any,
+    name: str,
+    descriptions: dict[str, str],
+    around: tuple[int, ...],
+    parts_of: Callable[[Any, str], Parts],
 ) -> None:
     """Add the parts of a value, which is nested in the objects of these identities."""
-    known = _leaf(value)
-    if known is not None:
-        descriptions[name] = known
-        return
-    descriptions[name], parts = _branches(value, name)
-    if id(value) not in around and (carried or not isinstance(value, FunctionType)):
+    descriptions[name], parts = parts_of(value, name)
+    if id(value) not in around:
         for part, inner in parts:
-            _describe(inner, part, descriptions, (*around, id(value)), carried)
+            _describe(inner, part, descriptions, (*around, id(value)), parts_of)
 
 
-def _leaf(value: Any) -> str | None:
-    if isinstance(value, np.ndarray):
-        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
-        return f"{value.dtype} array of shape {value.shape}, sha256 {digest}"
-    if isinstance(value, Enum):
-        return f"{type(value).__name__}.{value.name}"
-    if isinstance(value, np.generic):
-        return repr(value.item())
-    if value is None or isinstance(value, str | bytes | bool | int | float | complex | PurePath):
-        return repr(value)
-    return None
+def _parts_but_of_functions(value: Any, name: str) -> Parts:
+    words, parts = _parts(value, name)
+    return words, [] if isinstance(value, FunctionType) else parts
 
 
-def _branches(value: Any, name: str) -> tuple[str, list[tuple[str, Any]]]:
-    """Return the type of an object and its parts by name."""
-    if isinstance(value, Mapping):
-        return f"{len(value)} entries", [(f"{name}[{key!r}]", part) for key, part in value.items()]
-    if isinstance(value, Sequence):
-        return f"{len(value)} entries", [(f"{name}[{index}]", part) for index, part in enumerate(value)]
-    if is_dataclass(value) and not isinstance(value, type):
+@singledispatch
+def _parts(value: Any, name: str) -> Parts:
+    """Return the words on a value, and its parts."""
+    if is_dataclass(value):
         return _class(value), [(f"{name}.{part.name}", getattr(value, part.name)) for part in fields(value)]
-    if isinstance(value, partial):
-        return "partial", [(f"{name}.{part}", getattr(value, part)) for part in ("func", "args", "keywords")]
-    if isinstance(value, FunctionType):
-        cells = zip(value.__code__.co_freevars, value.__closure__ or (), strict=True)
-        carried = [(f"{name}.{variable}", cell.cell_contents) for variable, cell in cells if _filled(cell)]
-        given = [] if value.__defaults__ is None else [(f"{name}.defaults", value.__defaults__)]
-        return f"{value.__module__}.{value.__qualname__}", [*carried, *given]
     if hasattr(value, "__qualname__"):
         return f"{value.__module__}.{value.__qualname__}", []
     return _class(value), []
+
+
+_parts.register(type, lambda value, name: (f"{value.__module__}.{value.__qualname__}", []))
+_kind: type
+for _kind in (NoneType, str, bytes, int, float, complex, PurePath):
+    _parts.register(_kind, lambda value, name: (repr(value), []))
+for _kind in (np.generic, np.str_, np.bytes_):
+    _parts.register(_kind, lambda value, name: (repr(value.item()), []))
+for _kind in (Enum, IntEnum, StrEnum):
+    _parts.register(_kind, lambda value, name: (f"{type(value).__name__}.{value.name}", []))
+
+
+@_parts.register(np.ndarray)
+def _(value: np.ndarray, name: str) -> Parts:
+    digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
+    return f"{value.dtype} array of shape {value.shape}, sha256 {digest}", []
+
+
+@_parts.register(Mapping)
+def _(value: Mapping[Any, Any], name: str) -> Parts:
+    return f"{len(value)} entries", [(f"{name}[{key!r}]", part) for key, part in value.items()]
+
+
+@_parts.register(Sequence)
+def _(value: Sequence[Any], name: str) -> Parts:
+    return f"{len(value)} entries", [(f"{name}[{index}]", part) for index, part in enumerate(value)]
+
+
+@_parts.register(partial)
+def _(value: partial[Any], name: str) -> Parts:
+    return "partial", [(f"{name}.{part}", getattr(value, part)) for part in ("func", "args", "keywords")]
+
+
+@_parts.register(FunctionType)
+def _(value: FunctionType, name: str) -> Parts:
+    cells = zip(value.__code__.co_freevars, value.__closure__ or (), strict=True)
+    carried = [(f"{name}.{variable}", cell.cell_contents) for variable, cell in cells if _filled(cell)]
+    given = [] if value.__defaults__ is None else [(f"{name}.defaults", value.__defaults__)]
+    return f"{value.__module__}.{value.__qualname__}", [*carried, *given]
 
 
 def _filled(cell: Any) -> bool:

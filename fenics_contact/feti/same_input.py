@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact._base.fingerprint import described, require_alike
+from fenics_contact._base.fingerprint import described, described_by_names, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.fields import evaluate
 from fenics_contact._scene.loads import Load
@@ -26,9 +26,9 @@ def check_same_input(comm: MPI.Comm, scene: Scene, **settings: Any) -> None:
     if comm.size == 1:
         return
     with together(comm):
-        descriptions = {**described(scene, "scene", carried=False), **_values(scene)}
+        descriptions = {**described_by_names(scene, "scene"), **_values(scene)}
         for name, value in settings.items():
-            descriptions.update(described(value, name, carried=False))
+            descriptions.update(described_by_names(value, name))
     require_alike(comm, descriptions)
 
 

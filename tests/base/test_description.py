@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from fenics_contact import Coulomb
-from fenics_contact._base.fingerprint import described, differences
+from fenics_contact._base.fingerprint import described, described_by_names, differences
 from fenics_contact._base.launching import finished
 
 
@@ -71,7 +71,7 @@ def test_what_differs_is_described_differently_and_what_is_equal_alike(name: str
 
 def test_what_functions_carry_along_is_left_out_where_that_is_asked() -> None:
     one, other = ({"function": scaled(size), "number": size} for size in (1.0, 2.0))
-    found = differences(described(one, "it", carried=False), described(other, "it", carried=False))
+    found = differences(described_by_names(one, "it"), described_by_names(other, "it"))
     assert found == ["it['number'] (1.0, 2.0)"]
 
 
