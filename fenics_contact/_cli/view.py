@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import partial, singledispatch
 from pathlib import Path
+from types import NoneType
 from typing import Annotated, Any
 
 import typer
@@ -251,24 +252,35 @@ def show_record(console: Console, record: dict[str, Any]) -> None:
         value = record.get(name)
         if value in (None, {}, []):
             continue
-        if isinstance(value, dict):
-            history = value.get("history")
-            rest = {key: part for key, part in value.items() if key != "history"}
-            console.write(facts(dict(_flat(rest)), name))
-            console.write()
-            if history:
-                console.write(evaluations(history))
-                console.write()
-        elif isinstance(value, list):
-            for number, part in enumerate(value):
-                console.write(facts(dict(_flat(part)), f"{name} {number}"))
-            console.write()
-        else:
-            console.write(facts({name: value}))
+        _show(value, name, console)
     if record.get("forces"):
         names = {"force": "force", "length": "length", **record.get("more", {}).get("unit_names", {})}
         units = DerivedUnits.of(names["force"], names["length"], record.get("scene", {}))
         console.write(forces_table(record["forces"], units))
+
+
+@singledispatch
+def _show(value: Any, name: str, console: Console) -> None:
+    """Print an entry of a result."""
+    console.write(facts({name: value}))
+
+
+@_show.register(list)
+def _(value: list[Any], name: str, console: Console) -> None:
+    for number, part in enumerate(value):
+        console.write(facts(dict(_flat(part)), f"{name} {number}"))
+    console.write()
+
+
+@_show.register(dict)
+def _(value: dict[str, Any], name: str, console: Console) -> None:
+    history = value.get("history")
+    rest = {key: part for key, part in value.items() if key != "history"}
+    console.write(facts(dict(_flat(rest)), name))
+    console.write()
+    if history:
+        console.write(evaluations(history))
+        console.write()
 
 
 def evaluations(history: dict[str, list[Any]]) -> Table:
@@ -285,18 +297,28 @@ def evaluations(history: dict[str, list[Any]]) -> Table:
     return table
 
 
+@singledispatch
 def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
     """Return the parts of a nested entry by dotted names."""
-    if isinstance(value, dict):
-        parts = [_flat(part, f"{name}.{key}" if name else str(key)) for key, part in value.items()]
-        return [row for rows in parts for row in rows]
-    if isinstance(value, list):
-        shown = ", ".join(_number(part) for part in value[:LONGEST])
-        return [(name, f"{shown}, ... ({len(value)} in all)" if len(value) > LONGEST else shown)]
     return [(name, _number(value))]
 
 
+@_flat.register(dict)
+def _(value: dict[str, Any], name: str = "") -> list[tuple[str, str]]:
+    parts = [_flat(part, f"{name}.{key}" if name else str(key)) for key, part in value.items()]
+    return [row for rows in parts for row in rows]
+
+
+@_flat.register(list)
+def _(value: list[Any], name: str = "") -> list[tuple[str, str]]:
+    shown = ", ".join(_number(part) for part in value[:LONGEST])
+    return [(name, f"{shown}, ... ({len(value)} in all)" if len(value) > LONGEST else shown)]
+
+
+@singledispatch
 def _number(value: Any) -> str:
-    if value is None:
-        return ""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return str(value)
+
+
+_number.register(NoneType, lambda value: "")
+_number.register(float, lambda value: f"{value:.6g}")

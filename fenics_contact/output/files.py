@@ -17,9 +17,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import fields, is_dataclass
 from datetime import datetime
-from enum import Enum
-from functools import partial
+from enum import Enum, IntEnum, StrEnum
+from functools import partial, singledispatch
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -166,44 +167,93 @@ def json_text(data: Any) -> str:
     return json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
-    """Convert data to JSON's types."""
+class Strict:
+    """JSON's types alone: all else is refused by its place."""
 
-    def inside(part: Any, where: str) -> Any:
-        return plain(part, f"{place}{where}", lenient=lenient)
+    def kind(self, data: Any) -> dict[str, str]:
+        """Return what is said of a dataclass besides its fields."""
+        return {}
 
-    if isinstance(data, Enum):
-        return inside(data.value, "")
-    if is_dataclass(data) and not isinstance(data, type):
-        kind = {"type": type(data).__name__} if lenient else {}
-        return kind | {part.name: inside(getattr(data, part.name), f".{part.name}") for part in fields(data)}
-    if lenient and isinstance(data, np.ndarray) and data.size > SHOWN:
-        return in_short(data)
-    if isinstance(data, np.ndarray | np.generic):
-        return inside(data.tolist(), "")
-    if isinstance(data, Mapping):
-        return {_key(key, place, lenient): inside(value, f"[{key!r}]") for key, value in data.items()}
-    if isinstance(data, float) and not math.isfinite(data) and not lenient:
+    def key(self, key: Any, place: str) -> str:
+        """Return a key."""
+        if not isinstance(key, str):
+            raise InvalidInputError(f"keys of {place} must be strings, got {key!r}: convert it first")
+        return key
+
+    def array(self, data: np.ndarray, place: str) -> Any:
+        """Return an array."""
+        return plain(data.tolist(), place, self)
+
+    def infinite(self, data: float, place: str) -> None:
+        """Return a number that is not finite."""
         raise InvalidInputError(f"{place} must be finite, got {data}, which JSON has not: write None")
-    if isinstance(data, float):
-        return data if math.isfinite(data) else None
-    if data is None or isinstance(data, str | bool | int):
-        return data
-    if isinstance(data, Path):
-        return str(data)
-    if isinstance(data, Sequence) and not isinstance(data, bytes | bytearray):
-        return [inside(value, f"[{index}]") for index, value in enumerate(data)]
-    if lenient:
+
+    def other(self, data: Any, place: str) -> Any:
+        """Return what has none of JSON's types."""
+        raise InvalidInputError(
+            f"{place} must be a mapping, sequence, string, number, bool, None or array, got "
+            f"{type(data).__name__}"
+        )
+
+
+class Lenient(Strict):
+    """Anything: large arrays in short, objects and functions by their names."""
+
+    def kind(self, data: Any) -> dict[str, str]:
+        """Return the class."""
+        return {"type": type(data).__name__}
+
+    def key(self, key: Any, place: str) -> str:
+        """Return a key as text."""
+        return str(key)
+
+    def array(self, data: np.ndarray, place: str) -> Any:
+        """Return an array, a large one in short."""
+        return in_short(data) if data.size > SHOWN else super().array(data, place)
+
+    def infinite(self, data: float, place: str) -> None:
+        """Return None."""
+
+    def other(self, data: Any, place: str) -> Any:
+        """Return names."""
         return _named(data)
-    raise InvalidInputError(
-        f"{place} must be a mapping, sequence, string, number, bool, None or array, got {type(data).__name__}"
-    )
 
 
-def _key(key: Any, place: str, lenient: bool) -> str:
-    if not isinstance(key, str) and not lenient:
-        raise InvalidInputError(f"keys of {place} must be strings, got {key!r}: convert it first")
-    return str(key)
+def plain(data: Any, place: str = "data", form: Strict = Strict()) -> Any:
+    """Convert data to JSON's types."""
+    if is_dataclass(data) and not isinstance(data, type):
+        parts = {each.name: (getattr(data, each.name), f"{place}.{each.name}") for each in fields(data)}
+        return form.kind(data) | {name: plain(*part, form) for name, part in parts.items()}
+    return _plain(data, place, form)
+
+
+@singledispatch
+def _plain(data: Any, place: str, form: Strict) -> Any:
+    return form.other(data, place)
+
+
+_kind: type
+for _kind in (Enum, IntEnum, StrEnum):
+    _plain.register(_kind, lambda data, place, form: plain(data.value, place, form))
+for _kind in (np.generic, np.str_, np.bytes_):
+    _plain.register(_kind, lambda data, place, form: plain(data.tolist(), place, form))
+for _kind in (NoneType, str, int):
+    _plain.register(_kind, lambda data, place, form: data)
+for _kind in (bytes, bytearray):
+    _plain.register(_kind, _plain.dispatch(object))
+_plain.register(np.ndarray, lambda data, place, form: form.array(data, place))
+_plain.register(float, lambda data, place, form: data if math.isfinite(data) else form.infinite(data, place))
+_plain.register(Path, lambda data, place, form: str(data))
+
+
+@_plain.register(Mapping)
+def _(data: Mapping[Any, Any], place: str, form: Strict) -> dict[str, Any]:
+    return {form.key(key, place): plain(value, f"{place}[{key!r}]", form) for key, value in data.items()}
+
+
+@_plain.register(Sequence)
+def _(data: Sequence[Any], place: str, form: Strict) -> list[Any]:
+    return [plain(value, f"{place}[{index}]", form) for index, value in enumerate(data)]
 
 
 def _named(data: Any) -> dict[str, str]:

@@ -33,7 +33,7 @@ from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.direct import DirectSolution
 from fenics_contact.materials.elastic import Material
-from fenics_contact.output.files import plain, write_json
+from fenics_contact.output.files import Lenient, plain, write_json
 from fenics_contact.output.paraview import checked_name
 from fenics_contact.qp.solution import SolverStep
 from fenics_contact.readers.gmsh_session import interrupt_handler_kept
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 
 
 #: Any value as plain data.
-readable = partial(plain, lenient=True)
+readable = partial(plain, form=Lenient())
 
 
 def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0.0) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, singledispatch
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
@@ -85,12 +85,18 @@ def obstacles_of(state: State) -> list[SurfaceShape]:
     return [simplified(_where_it_is(each, state)) for each in obstacles]
 
 
-def _where_it_is(obstacle: RigidObstacle, state: State) -> SurfaceShape:
+@singledispatch
+def _where_it_is(obstacle: Any, state: State) -> SurfaceShape:
     """Return an obstacle where it is in a state. Collective."""
-    if isinstance(obstacle, MovingObstacle):
-        return obstacle.at(state.time)
-    if not isinstance(obstacle, RigidTool):
-        return obstacle
+    shape: SurfaceShape = obstacle
+    return shape
+
+
+_where_it_is.register(MovingObstacle, lambda obstacle, state: obstacle.at(state.time))
+
+
+@_where_it_is.register(RigidTool)
+def _(obstacle: RigidTool, state: State) -> SurfaceShape:
     motion = state.tools()[obstacle.name]
     return tool_at(obstacle.shape, np.array(obstacle.at), motion.rotation, motion.displacement)
 
@@ -139,26 +145,33 @@ def shade_obstacles(axes: Axes, obstacles: list[SurfaceShape], frame: Frame) -> 
             axes.contour(x, y, distance, levels=[0.0], colors=[GREY], linewidths=1.5, zorder=0.5)
 
 
-def outline(shape: SurfaceShape, points: np.ndarray) -> list[np.ndarray]:
+@singledispatch
+def outline(shape: Any, points: np.ndarray) -> list[np.ndarray]:
     """Return lines that show an obstacle near bodies, (n, dim) each.
 
     Of a plane the edge of the part under the bodies, of a sphere three circles, of a cylinder a circle at
     each end of the part near the bodies and four lines between them, of a box the edges of its faces, of
     other shapes in space sections near the bodies.
     """
-    if isinstance(shape, Plane):
-        return [_edge(shape, points)]
-    if isinstance(shape, Sphere):
-        axes = np.eye(len(shape.centre))
-        return [
-            _circle(np.asarray(shape.centre), (first, second), shape.radius)
-            for k, first in enumerate(axes)
-            for second in axes[:k]
-        ]
-    if isinstance(shape, Box) and shape.dim == 3:
-        return _faces(shape)
-    if not isinstance(shape, Cylinder):
-        return _net(shape, points) if points.shape[1] == 3 else []
+    return _net(shape, points) if points.shape[1] == 3 else []
+
+
+outline.register(Plane, lambda shape, points: [_edge(shape, points)])
+outline.register(Box, lambda shape, points: _faces(shape) if shape.dim == 3 else [])
+
+
+@outline.register(Sphere)
+def _(shape: Sphere, points: np.ndarray) -> list[np.ndarray]:
+    axes = np.eye(len(shape.centre))
+    return [
+        _circle(np.asarray(shape.centre), (first, second), shape.radius)
+        for k, first in enumerate(axes)
+        for second in axes[:k]
+    ]
+
+
+@outline.register(Cylinder)
+def _(shape: Cylinder, points: np.ndarray) -> list[np.ndarray]:
     axis = np.asarray(shape.axis)
     along = (points - np.asarray(shape.point)) @ axis
     ends = [np.asarray(shape.point) + reach * axis for reach in (along.min(), along.max())]
