@@ -15,6 +15,7 @@ from fenics_contact._cli.console import ExitCode, Terminated, console_of, write_
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.output.files import only_run_in
 from fenics_contact.study.report import write_report
+from fenics_contact.study.results import Results
 from fenics_contact.study.runner import Settings, StudyPlan, prepare
 from fenics_contact.study.scenes import BUILT_IN, find_study
 from fenics_contact.study.study import Sweep
@@ -101,20 +102,20 @@ def accuracy(
         if status and (folder / "study.json").exists():
             console.write(f"results of an earlier run stay in {folder}/: --report writes those that are done")
             raise typer.Exit(status)
-        words = _report(plan, folder, figures=not no_figures)
+        words = write_report(folder, _answered(plan, folder), figures=not no_figures)
     console.write(f"{words}\nresults in {folder}/")
     if status:
         raise typer.Exit(status)
 
 
-def _report(plan: StudyPlan, folder: Path, *, figures: bool) -> str:
+def _answered(plan: StudyPlan, folder: Path) -> Results:
     results = plan.collected()
     if not results.good:
         reasons = "".join(f"\n  {run.failed}" for run in results.runs[:3])
         raise InvalidInputError(
             f"a report needs runs that have an answer, {folder} has none: run without --report{reasons}"
         )
-    return write_report(folder, results, figures=figures)
+    return results
 
 
 def _measure(plan: StudyPlan) -> int:

@@ -11,7 +11,7 @@ import typer
 from fenics_contact._adaptive.minimised import AccurateDesign
 from fenics_contact._base.display import DerivedUnits
 from fenics_contact._cli.console import Console, ExitCode, facts
-from fenics_contact._cli.options import checkpoint_of, forget, resumable, scene_command
+from fenics_contact._cli.options import checkpoint_of, forget, plan_of_design, resumable, scene_command
 from fenics_contact._cli.run import table_of_levels
 from fenics_contact._cli.view import Gallery, can_draw, draw_meshes, draw_state
 from fenics_contact._optimize.result import Result
@@ -134,7 +134,7 @@ def _optimize(console: Console, file: SceneFile, resume: bool | None, pictures: 
     gallery.require_all()
 
 
-optimize = scene_command(_optimize, check=_check, sensitivity=True, accurate=("accuracy",))
+optimize = scene_command(_optimize, plan=plan_of_design, check=_check, accurate=("accuracy",))
 
 
 def _to_accuracy(console: Console, file: SceneFile, task: ShapeTask, resume: bool | None) -> _Done:

@@ -6,6 +6,7 @@ import inspect
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -15,6 +16,7 @@ from fenics_contact._base.checkpoint import Checkpoint, interruptible
 from fenics_contact._base.display import counted
 from fenics_contact._base.progress import is_visible, show_progress
 from fenics_contact._cli.console import Console, console_of, facts, write_stderr
+from fenics_contact._scene.plan import Plan
 from fenics_contact._scene_file.reading import SceneFile, read_scene_file
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
 
@@ -27,13 +29,14 @@ def scene_command(
     compute: Callable[[Console, SceneFile, bool | None, bool], None],
     *,
     check: Callable[[SceneFile], None] = lambda file: None,
-    sensitivity: bool = False,
+    plan: Callable[[SceneFile], dict[str, str]],
     accurate: Sequence[str] = (),
 ) -> Command:
     """Return the command that reads a scene file, checks it, prints its plan and computes.
 
-    ``compute`` takes whether to resume, and whether to draw; its docstring is that of the command;
-    ``accurate``: names of the options that ask for an accuracy, those it has of ``accuracy`` and ``of``.
+    ``compute`` takes whether to resume, and whether to draw; its docstring is that of the command; ``plan``:
+    what it prints of the plan, see `plan_of_states`; ``accurate``: names of the options that ask for an
+    accuracy, those it has of ``accuracy`` and ``of``.
     """
 
     def command(
@@ -123,14 +126,24 @@ def scene_command(
     ) -> None:
         console = console_of(context)
         with show_progress(console.comm):
-            overrides = [*(settings or ()), *_asked(accuracy, of)]
-            file = _read(console, scene, output, tolerance, overrides, python, statics_only)
+            overrides = [*(settings or ()), *_asked(accuracy, of), *_overridden(tolerance, output)]
+            if scene.suffix.lower() in DECKS:
+                from fenics_contact.decks.deck import read_deck
+                from fenics_contact.decks.file import read_deck_file
+
+                read = partial(read_deck, statics_only=statics_only)
+                file: SceneFile = read_deck_file(scene, console.comm, overrides, read)
+            elif statics_only:
+                raise InvalidInputError(f"--statics-only is of decks, got the scene file {str(scene)!r}")
+            else:
+                file = read_scene_file(scene, console.comm, overrides=overrides, python=python)
             check(file)
-            _show_plan(console, file, sensitivity=sensitivity)
+            _show_plan(console, file, plan(file))
             console.write()
             if dry_run:
+                drawn = file.document.output.drawn if pictures else []
                 refines = bool(accurate) and file.document.accuracy is not None
-                _show_outputs(console, file, draws=pictures, meshes=refines)
+                _show_outputs(console, file, [*drawn, *(["meshes"] if drawn and refines else [])])
             else:
                 compute(console, file, resume, pictures)
 
@@ -160,29 +173,16 @@ def _asked(accuracy: str | None, of: str | None) -> list[str]:
     return asked
 
 
-def _read(
-    console: Console,
-    scene: Path,
-    output: Path | None,
-    tolerance: str | None,
-    overrides: list[str],
-    python: bool,
-    statics_only: bool,
-) -> SceneFile:
-    """Read a scene file with the values that options override. Collective."""
+def _overridden(tolerance: str | None, output: Path | None) -> list[str]:
+    """Return the keys of a scene file with the values of options."""
+    keys = []
     if tolerance is not None:
-        overrides.append(f"solver.tolerance={tolerance}")
+        keys.append(f"solver.tolerance={tolerance}")
     if output is not None:
         if not is_visible(str(output)):
             raise InvalidInputError(f"--output must be a path that can be shown, got {str(output)!r}")
-        overrides.append(f"output.folder={json.dumps(str(output), ensure_ascii=False)}")
-    if scene.suffix.lower() in DECKS:
-        from fenics_contact.decks.file import read_deck_file
-
-        return read_deck_file(scene, console.comm, overrides, statics_only)
-    if statics_only:
-        raise InvalidInputError(f"--statics-only is of decks, got the scene file {str(scene)!r}")
-    return read_scene_file(scene, console.comm, overrides=overrides, python=python)
+        keys.append(f"output.folder={json.dumps(str(output), ensure_ascii=False)}")
+    return keys
 
 
 def checkpoint_of(file: SceneFile, resume: bool | None) -> Checkpoint | None:
@@ -198,11 +198,10 @@ def forget(console: Console, checkpoint: Checkpoint | None) -> None:
         Path(checkpoint.path).unlink(missing_ok=True)
 
 
-def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
-    """Print the plan of a scene. Collective."""
-    plan = file.scene.plan(file.partitions, sensitivity=sensitivity)
-    rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
-    if file.steps and not sensitivity:
+def plan_of_states(file: SceneFile) -> dict[str, str]:
+    """Return what is solved, name -> words. Collective."""
+    rows = _rows(file.scene.plan(file.partitions))
+    if file.steps:
         rows["load steps"] = str(len(file.steps))
     halvings = file.document.solver.halvings
     if halvings:
@@ -210,20 +209,34 @@ def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
         times = counted(halvings, "time")
         rows["cells halved"] = f"{times}, to {cells} cells; all else is of the first meshes"
     asked = file.document.accuracy
-    if asked is not None:
-        words = asked.in_words
-        rows["accuracy"] = f"objective{words.removeprefix(str(asked.quantity))}" if sensitivity else words
+    return rows if asked is None else rows | {"accuracy": asked.in_words}
+
+
+def plan_of_design(file: SceneFile) -> dict[str, str]:
+    """Return what is solved for derivatives by shapes, name -> words. Collective."""
+    rows = _rows(file.scene.plan(file.partitions, sensitivity=True))
+    asked = file.document.accuracy
+    if asked is None:
+        return rows
+    return rows | {"accuracy": f"objective{asked.in_words.removeprefix(str(asked.quantity))}"}
+
+
+def _rows(plan: Plan) -> dict[str, str]:
+    return {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
+
+
+def _show_plan(console: Console, file: SceneFile, rows: dict[str, str]) -> None:
+    """Print the plan of a scene. Collective."""
     console.write(f"{file.title}: {file.source.name} on {console.ranks}")
     console.write(facts(rows))
     for words in file.notes:
         console.write(f"! {words}")
 
 
-def _show_outputs(console: Console, file: SceneFile, *, draws: bool, meshes: bool) -> None:
-    """Report what a run would write; meshes: whether these are drawn with the pictures of the file."""
+def _show_outputs(console: Console, file: SceneFile, drawn: Sequence[str]) -> None:
+    """Report what a run would write, and what it would draw."""
     output = file.document.output
-    drawn = [*output.drawn, *(["meshes"] if output.drawn and meshes else [])]
-    pictures = f", pictures of {', '.join(drawn)}" if draws and drawn else ""
+    pictures = f", pictures of {', '.join(drawn)}" if drawn else ""
     kinds = f", {', '.join(output.files)} files" if output.files else ""
     shapes = (
         f", {', '.join(output.design)} files of the design" if file.document.design and output.design else ""

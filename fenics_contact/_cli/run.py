@@ -19,7 +19,7 @@ from fenics_contact._cli.console import (
     state_facts,
     step_table,
 )
-from fenics_contact._cli.options import checkpoint_of, forget, resumable, scene_command
+from fenics_contact._cli.options import checkpoint_of, forget, plan_of_states, resumable, scene_command
 from fenics_contact._cli.view import Gallery, can_draw, draw_meshes, draw_state
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import LoadStepError
@@ -63,7 +63,7 @@ def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool)
         raise typer.Exit(int(ExitCode.NOT_CONVERGED))
 
 
-run = scene_command(_run, check=SceneFile.check_accuracy, accurate=("accuracy", "of"))
+run = scene_command(_run, plan=plan_of_states, check=SceneFile.check_accuracy, accurate=("accuracy", "of"))
 
 
 def _files(file: SceneFile) -> list[str]:

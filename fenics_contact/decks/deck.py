@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -212,17 +212,24 @@ def read_deck(path: str | Path, comm: MPI.Comm | None = None, *, statics_only: b
         >>> deck = read_deck("bracket.inp")  # doctest: +SKIP
         >>> states = deck.solve(MPI.COMM_WORLD)  # doctest: +SKIP
     """
-    return on_root_then_bcast(comm, lambda: _read(Path(path), statics_only))
+    chosen = _leading_statics if statics_only else _all
+    return on_root_then_bcast(comm, lambda: _read(Path(path), chosen))
 
 
-def _read(path: Path, statics_only: bool = False) -> Deck:
+#: Splits cards into those that are read and those that are left out.
+Chosen: TypeAlias = Callable[[Sequence[Card]], tuple[Sequence[Card], Sequence[Card]]]
+
+
+def _all(cards: Sequence[Card]) -> tuple[Sequence[Card], Sequence[Card]]:
+    return cards, ()
+
+
+def _read(path: Path, chosen: Chosen = _all) -> Deck:
     require_file(path, "a deck")
-    cards: Sequence[Card] = read_cards(path)
+    cards, left = chosen(read_cards(path))
     record = Record()
-    if statics_only:
-        cards, left = _leading_statics(cards)
-        if left:
-            record.note(left[0], "this step and all behind it are left out: they are no statics")
+    if left:
+        record.note(left[0], "this step and all behind it are left out: they are no statics")
     refuse_unknown(cards)
     try:
         deck = DeckCards.of(path.name, cards, record)

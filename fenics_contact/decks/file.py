@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -71,7 +71,7 @@ class DeckFile(SceneFile):
 
 
 def read_deck_file(
-    path: Path, comm: MPI.Comm, overrides: Sequence[str], statics_only: bool = False
+    path: Path, comm: MPI.Comm, overrides: Sequence[str], read: Callable[[Path, MPI.Comm], Deck] = read_deck
 ) -> DeckFile:
     """Read a deck for the command line. Collective on ``comm``."""
     for override in overrides:
@@ -83,4 +83,4 @@ def read_deck_file(
             )
     source = Source(path.name, path.parent, _NOTHING).with_overrides(overrides)
     document = validated(source)
-    return DeckFile(source, document, comm, read_deck(path, comm, statics_only=statics_only))
+    return DeckFile(source, document, comm, read(path, comm))

@@ -74,6 +74,7 @@ from fenics_contact.pictures.unrolled import (
     contact_patches,
     draw_traction,
     label_patch,
+    mirrored,
     pressure_bar,
 )
 from fenics_contact.results.fields import in_space
@@ -504,7 +505,7 @@ def _draw_status(
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
             tips.append(draw_status(axes, patch, counted=False))
             axes.set_title(_words(patch, units) if not name else f"{name}\n{_words(patch, units)}")
-            label_patch(axes, patch, units, mirror=True)
+            label_patch(axes, patch, units, mirrored)
         every, (low, high) = np.concatenate(tips), panels[0].get_ylim()
         panels[0].set_ylim(every.min(initial=low), every.max(initial=high))  # arrows do not reach into titles
         for axes in panels[len(patches) :]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import BinaryIO
+from typing import BinaryIO, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter, MaxNLocator
@@ -39,6 +40,9 @@ from fenics_contact.pictures.canvas import (
 from fenics_contact.pictures.curves import ContactTrace
 from fenics_contact.results.contact import NormalForces, Status
 from fenics_contact.results.state import State
+
+#: What is done with a reversed axis, and said of it.
+Turned: TypeAlias = Callable[[Axes, Axis, View], str]
 
 #: A surface runs around an axis if Σ A n nᵀ has one eigenvalue below this fraction of the next.
 SLENDER = 0.05
@@ -93,7 +97,7 @@ class Unrolling:
             return f"around the axis ({units.length})", f"along the axis ({units.length})"
         return f"around {axis} ({units.length}), 0 towards {zero}", f"{axis} ({units.length})"
 
-    def label(self, axes: Axes, units: Units, *, mirror: bool) -> None:
+    def label(self, axes: Axes, units: Units, turned: Turned) -> None:
         """Name the axes, which no side reverses."""
         across, along = self.labels(units)
         axes.set(xlabel=across, ylabel=along)
@@ -115,9 +119,9 @@ class Projection:
         """Return vectors, (n, 3), as they are seen, (n, 2)."""
         return self.view.project(vectors)
 
-    def label(self, axes: Axes, units: Units, *, mirror: bool) -> None:
+    def label(self, axes: Axes, units: Units, turned: Turned) -> None:
         """Name the axes, see `label_axes`."""
-        label_axes(axes, self.view, units, mirror=mirror)
+        label_axes(axes, self.view, units, turned)
 
 
 def unrolling_of(
@@ -288,28 +292,35 @@ def _frame(places: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: fl
     return Frame(np.maximum(middle - half, low), np.minimum(middle + half, high))
 
 
-def label_axes(axes: Axes, view: View, units: Units, *, mirror: bool = False) -> None:
-    """Label the axes of a view, a reversed one with decreasing numbers and the viewing side, or mirrored."""
-    for axis, direction, word, back in (
-        (axes.xaxis, view.right, "right", "to the left"),
-        (axes.yaxis, view.up, "up", "down"),
-    ):
+def viewing_side(axes: Axes, axis: Axis, view: View) -> str:
+    """Return how a reversed axis runs and from where it is seen."""
+    seen, back = axis_label(view.towards), "to the left" if axis is axes.xaxis else "down"
+    return f", runs {back}" + (f": seen from {seen}" if seen else "")
+
+
+def mirrored(axes: Axes, axis: Axis, view: View) -> str:
+    """Turn a reversed horizontal axis, see `viewing_side` for a vertical one."""
+    if axis is not axes.xaxis:
+        return viewing_side(axes, axis, view)
+    axes.invert_xaxis()
+    return ""
+
+
+def label_axes(axes: Axes, view: View, units: Units, turned: Turned = viewing_side) -> None:
+    """Label the axes of a view, a reversed one with decreasing numbers and what `turned` returns for it."""
+    for axis, direction, word in ((axes.xaxis, view.right, "right"), (axes.yaxis, view.up, "up")):
         name = axis_label(direction)
         label = f"{name.strip('−') or word} ({units.length})"
         if name.startswith("−"):
             axis.set_major_formatter(FuncFormatter(lambda value, _: f"{0 - value:g}".replace("-", "−")))
-            if mirror and axis is axes.xaxis:
-                axes.invert_xaxis()
-            else:
-                seen = axis_label(view.towards)
-                label += f", runs {back}" + (f": seen from {seen}" if seen else "")
+            label += turned(axes, axis, view)
         axis.set_label_text(label)
 
 
-def label_patch(axes: Axes, patch: ContactPatch, units: Units, *, mirror: bool = False) -> None:
+def label_patch(axes: Axes, patch: ContactPatch, units: Units, turned: Turned = viewing_side) -> None:
     """Show the frame of a contact surface with equal scales, and name its axes; see `label_axes`."""
     patch.frame.fit(axes)
-    patch.flat.label(axes, units, mirror=mirror)
+    patch.flat.label(axes, units, turned)
 
 
 def pressure_bar(axes: Axes, clim: tuple[float, float], extend: str, units: Units) -> None:

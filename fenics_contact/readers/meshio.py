@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -99,14 +100,25 @@ class Block:
 _NO_FACETS = np.zeros((0, 0), dtype=np.int64)
 
 
-def cells_of(
-    mesh: meshio.Mesh, source: str, corners_only: bool
-) -> tuple[np.ndarray, list[Block], dict[str, np.ndarray]]:
+def corners_of(mesh: meshio.Mesh) -> meshio.Mesh:
+    """Return a mesh without the nodes of quadratic cells that are no corners."""
+    import meshio
+
+    linear = copy(mesh)
+    linear.cells = []
+    for block in mesh.cells:
+        kind = _SERENDIPITY_OR_LAGRANGE.get(block.type, block.type)
+        corners = _CORNERS.get(kind)
+        linear.cells.append(meshio.CellBlock(kind, block.data[:, :corners]) if corners else block)
+    return linear
+
+
+def cells_of(mesh: meshio.Mesh, source: str) -> tuple[np.ndarray, list[Block], dict[str, np.ndarray]]:
     """Sort the blocks of a mesh into cells and facets, and return the role of each block."""
     dim = max((block.dim for block in mesh.cells if len(block)), default=0)
     if dim < 2:
         raise InvalidInputError(f"{source} must hold cells, it has {_counted(mesh)}: save those of bodies")
-    used = [_nodes(block, mesh, source, corners_only) for block in mesh.cells if block.dim == dim]
+    used = [_nodes(block, source) for block in mesh.cells if block.dim == dim]
     points = np.array(mesh.points, dtype=np.float64)
     blocks_of: dict[int, list[np.ndarray]] = {}
     for nodes in used:
@@ -127,25 +139,23 @@ def cells_of(
                     "with one of them, or read it with corners_only=True"
                 )
         cells[kinds[columns]] = turned_right_handed(points, nodes, source)
-    return points, _blocks(mesh, dim, kinds, corners_only), cells
+    return points, _blocks(mesh, dim, kinds), cells
 
 
-def _nodes(block: meshio.CellBlock, mesh: meshio.Mesh, source: str, corners_only: bool) -> np.ndarray:
+def _nodes(block: meshio.CellBlock, source: str) -> np.ndarray:
     name = block.type
     linear = _SERENDIPITY_OR_LAGRANGE.get(name, name)
     if linear not in _CORNERS:
         raise other_cells(source, name)
-    nodes = np.array(block.data, dtype=np.int64)
-    return nodes[:, : _CORNERS[linear]] if corners_only else nodes
+    return np.array(block.data, dtype=np.int64)
 
 
-def _blocks(mesh: meshio.Mesh, dim: int, kinds: Mapping[int, str], corners_only: bool) -> list[Block]:
+def _blocks(mesh: meshio.Mesh, dim: int, kinds: Mapping[int, str]) -> list[Block]:
     blocks, count = [], dict.fromkeys(kinds.values(), 0)
     for block in mesh.cells:
         size = len(block)
         if block.dim == dim:
-            corners = _CORNERS[_SERENDIPITY_OR_LAGRANGE.get(block.type, block.type)]
-            kind = kinds[corners if corners_only else block.data.shape[1]]
+            kind = kinds[block.data.shape[1]]
             blocks.append(Block(kind, count[kind], _NO_FACETS, size))
             count[kind] += size
             continue
@@ -184,7 +194,7 @@ def labels_of(
     sets = _sets(mesh, blocks, source)
     node_sets = {name: np.asarray(nodes, dtype=np.int64) for name, nodes in _node_sets(mesh).items()}
     of_sets = {name: members for name, members in sets.items() if _cells_among(members, blocks)}
-    tags = _tag_array(mesh, blocks, labels, bool(of_sets), source)
+    tags = _tag_array(mesh, blocks, labels, of_sets, source)
     members = sets if tags is None else _by_tag(mesh, tags)
     facets = _facets({**({} if tags is None else members), **sets}, blocks)
     if labels == "pieces":
@@ -238,12 +248,12 @@ def _families(names: Mapping[int, Sequence[str]]) -> dict[str, list[int]]:
 
 
 def _tag_array(
-    mesh: meshio.Mesh, blocks: Sequence[Block], labels: str | None, have_sets: bool, source: str
+    mesh: meshio.Mesh, blocks: Sequence[Block], labels: str | None, sets: Collection[Label], source: str
 ) -> str | None:
     """Return the name of the cell data used as labels; None if sets are used, or nothing."""
     whole = [name for name, data in mesh.cell_data.items() if _holds_integers(data, blocks)]
     if labels in ("sets", "blocks", "pieces"):
-        if labels == "sets" and not have_sets:
+        if labels == "sets" and not sets:
             raise InvalidInputError(f'labels="sets" needs cell sets, {source} has none: it has {whole}')
         return None
     if labels is not None:
@@ -252,7 +262,7 @@ def _tag_array(
                 f"labels must be 'sets', 'blocks', 'pieces' or cell data of integers {whole}, got {labels!r}"
             )
         return labels
-    if have_sets:
+    if sets:
         return None
     candidates = [name for name in _USUAL if name in whole] or [n for n in whole if n not in _NO_LABELS]
     if len(candidates) > 1:
@@ -417,7 +427,9 @@ def read_mesh(
     other = None if file_format or corners_only else _other_reader(path, labels)
     if other is not None:
         return other(path, bodies, surfaces, comm=comm)
-    how = partial(_tagged, labels=labels, corners_only=corners_only, everything=bodies is None)
+    how = partial(
+        _tagged, labels=labels, kept=corners_of if corners_only else _whole, everything=bodies is None
+    )
     return bodies_of(on_root_then_bcast(comm, lambda: _read(path, how, file_format)), bodies, surfaces)
 
 
@@ -448,7 +460,8 @@ def from_meshio(
     Raises:
         InvalidInputError: As `read_mesh`.
     """
-    tagged = _tagged(mesh, "the mesh of meshio", labels, corners_only, everything=bodies is None)
+    kept = corners_of if corners_only else _whole
+    tagged = _tagged(mesh, "the mesh of meshio", labels, kept, everything=bodies is None)
     return bodies_of(tagged, bodies, surfaces)
 
 
@@ -500,9 +513,19 @@ def _read_by_meshio(path: Path, file_format: str | None) -> meshio.Mesh:
         ) from reason
 
 
+def _whole(mesh: meshio.Mesh) -> meshio.Mesh:
+    return mesh
+
+
 def _tagged(
-    mesh: meshio.Mesh, source: str, labels: str | None, corners_only: bool, *, everything: bool
+    given: meshio.Mesh,
+    source: str,
+    labels: str | None,
+    kept: Callable[[meshio.Mesh], meshio.Mesh],
+    *,
+    everything: bool,
 ) -> TaggedMesh:
-    points, blocks, cells = cells_of(mesh, source, corners_only)
+    mesh = kept(given)
+    points, blocks, cells = cells_of(mesh, source)
     groups, facets, node_sets = labels_of(mesh, blocks, cells, labels, source, everything)
     return TaggedMesh(source, points, cells, groups, facets, ("cell label", "facet label"), node_sets)

@@ -216,7 +216,7 @@ def test_every_ending_has_its_number(
     def fails(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("fenics_contact._cli.options._read", fails)
+    monkeypatch.setattr("fenics_contact._cli.options.read_scene_file", fails)
     assert run("run", SCENES / "two_blocks.toml") == code
     written = capsys.readouterr().err
     assert ("Traceback" in written) == (code == 1), "a traceback is for bugs"

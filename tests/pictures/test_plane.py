@@ -66,7 +66,7 @@ from fenics_contact.pictures.curves import contact_trace, walk
 from fenics_contact.pictures.designs import _outlines as profiles
 from fenics_contact.pictures.drawing import obstacle_layers, obstacles_of, outline, shade_obstacles
 from fenics_contact.pictures.section import refined, strongest_contact
-from fenics_contact.pictures.unrolled import contact_patches, label_axes
+from fenics_contact.pictures.unrolled import contact_patches, label_axes, mirrored, viewing_side
 from fenics_contact.shapes import Box, Cone, Plane, SignedDistance, Sphere, SurfaceShape, Torus, Triangulation
 from tests.pictures.moving_states import block_among_movers, pressed_by_a_lid
 from tests.pictures.plane_states import caged_block, hung_block, pin_in_ring, plane_block
@@ -418,14 +418,14 @@ def test_an_axis_that_runs_backwards_says_so() -> None:
     labels = []
 
     def draw(figure: Any) -> None:
-        for view, mirror in (
-            (face_on(np.array([0.0, 0.0, -1.0])), False),
-            (face_on(np.array([0.0, 0.0, -1.0])), True),
-            (face_on(np.array([1.0, 0.0, 0.0])), False),
+        for view, turned in (
+            (face_on(np.array([0.0, 0.0, -1.0])), viewing_side),
+            (face_on(np.array([0.0, 0.0, -1.0])), mirrored),
+            (face_on(np.array([1.0, 0.0, 0.0])), viewing_side),
         ):
             axes = figure.subplots()
             axes.set_xlim(0.0, 2.0)
-            label_axes(axes, view, Units(), mirror=mirror)
+            label_axes(axes, view, Units(), turned)
             labels.append((axes.get_xlabel(), axes.get_ylabel(), axes.xaxis_inverted()))
 
     drawn((640, 400), "", draw)
