@@ -118,18 +118,21 @@ def checked(*own: str) -> Callable[[Class], Class]:
     """
 
     def with_check(cls: Class) -> Class:
-        further = getattr(cls, "__post_init__", None)  # its own, or that of a base
+        further = getattr(cls, "__post_init__", _nothing_else)  # its own, or that of a base
 
         def __post_init__(self: Any) -> None:
             _check(self, cls, own)
-            if further is not None:
-                further(self)
+            further(self)
 
-        __post_init__.__doc__ = getattr(further, "__doc__", None) or "Reject values of other types."
+        __post_init__.__doc__ = further.__doc__
         cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
         return cls
 
     return with_check
+
+
+def _nothing_else(instance: Any) -> None:
+    """Reject values of other types."""
 
 
 def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
@@ -139,9 +142,7 @@ def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
         if field.name in own or field.name not in hints:
             continue
         name = f"{type(instance).__name__}.{field.name}"
-        wrong = _misfit(getattr(instance, field.name), hints[field.name], name)
-        if wrong is not None:
-            place, hint, value = wrong
+        for place, hint, value in _misfits(getattr(instance, field.name), hints[field.name], name):
             explanation = meaning(type(instance), field.name)
             given = f"{place} must be {_named(hint)}, got {reprlib.repr(value)}"
             raise InvalidInputError(f"{given}: {explanation}" if explanation else given)
@@ -152,21 +153,19 @@ def _hints(cls: type) -> dict[str, Any]:
     return get_type_hints(cls)
 
 
-def _misfit(value: Any, hint: Any, place: str) -> tuple[str, Any, Any] | None:
-    """Return where a value does not fit, the declared type and the value there; None if it fits."""
+def _misfits(value: Any, hint: Any, place: str) -> list[tuple[str, Any, Any]]:
+    """Return where a value does not fit first, the declared type and the value there; nothing if it fits."""
     if get_origin(hint) in (Union, UnionType):
-        if any(_misfit(value, option, place) is None for option in get_args(hint)):
-            return None
+        if not all(_misfits(value, option, place) for option in get_args(hint)):
+            return []
         # For the alternative of the right form the misfit is located more precisely.
-        inner = (_misfit(value, option, place) for option in get_args(hint))
-        return next((wrong for wrong in inner if wrong and wrong[0] != place), (place, hint, value))
+        every = (wrong for option in get_args(hint) for wrong in _misfits(value, option, place))
+        return [next((wrong for wrong in every if wrong[0] != place), (place, hint, value))]
     if not _is_one(value, hint):
-        return place, hint, value
-    for key, part in _parts(value, hint):
-        inside = get_args(hint)[-1 if get_origin(hint) is Mapping else 0]
-        if (wrong := _misfit(part, inside, f"{place}[{key!r}]")) is not None:
-            return wrong
-    return None
+        return [(place, hint, value)]
+    inside = get_args(hint)[-1 if get_origin(hint) is Mapping else 0 :]
+    wrong = (_misfits(part, inside[0], f"{place}[{key!r}]") for key, part in _parts(value, hint))
+    return next(filter(None, wrong), [])
 
 
 def _is_one(value: Any, hint: Any) -> bool:
@@ -256,30 +255,29 @@ def naming_arguments(function: Callable[Given, Found]) -> Callable[Given, Found]
             raise
         except (AttributeError, TypeError, ValueError, LookupError) as error:
             words = _unfit_argument(function, arguments, named)
-            if words is None:
+            if not words:
                 raise
             raise InvalidInputError(words) from error
 
     return called
 
 
-def _unfit_argument(function: Any, arguments: tuple[Any, ...], named: dict[str, Any]) -> str | None:
-    """Return words on the first argument that does not fit its declaration, None if all do."""
+def _unfit_argument(function: Any, arguments: tuple[Any, ...], named: dict[str, Any]) -> str:
+    """Return words on the first argument that does not fit its declaration, "" if all do."""
     try:
         given = signature(function).bind(*arguments, **named).arguments
     except TypeError:
-        return None  # Python names arguments that are missing or too many
+        return ""  # Python names arguments that are missing or too many
     hints = _argument_hints(inspect.unwrap(function))
     for name, value in given.items():
-        wrong = None
+        wrong: list[tuple[str, Any, Any]] = []
         with suppress(TypeError):  # a declaration that no value can be compared with
-            wrong = _misfit(value, hints.get(name, Any), name)
-        if wrong is not None:
-            place, hint, found = wrong
+            wrong = _misfits(value, hints.get(name, Any), name)
+        for place, hint, found in wrong:
             words = f"{function.__name__}: {place} must be {_kinds(hint)}, got {kind_in_words(type(found))}"
             explanation = meaning(function, name)
             return f"{words}: {explanation}" if explanation else words
-    return None
+    return ""
 
 
 @cache

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import typer
 
-from fenics_contact._adaptive.minimised import AccurateDesign
 from fenics_contact._base.display import DerivedUnits
 from fenics_contact._cli.console import Console, ExitCode, facts
 from fenics_contact._cli.options import checkpoint_of, forget, plan_of_design, resumable, scene_command
 from fenics_contact._cli.run import table_of_levels
 from fenics_contact._cli.view import Gallery, can_draw, draw_meshes, draw_state
 from fenics_contact._optimize.result import Result
+from fenics_contact._scene.scene import Scene
 from fenics_contact._scene_file.reading import SceneFile, ShapeTask
 from fenics_contact.design.memory import DesignPoint, JointPoint
 from fenics_contact.design.problem import ShapeProblem
@@ -99,7 +100,8 @@ class _Done:
 
     `problem`: that of the result, on the last mesh; `gridded`: on a mesh whose designed surfaces have grids
     of nodes, in space the first; `before`: the first design, on the same mesh; `products`: products with F on
-    all meshes.
+    all meshes; `optimisations`: one for each mesh; `meshes`: scenes whose meshes are drawn; `missed`: why an
+    accuracy was not reached.
     """
 
     result: Result
@@ -108,7 +110,9 @@ class _Done:
     before: DesignPoint | JointPoint
     products: int
     written: list[Path]
-    accurate: AccurateDesign | None = None
+    optimisations: Sequence[Result]
+    meshes: Mapping[str, Scene] = field(default_factory=dict)
+    missed: str = ""
 
 
 def _optimize(console: Console, file: SceneFile, resume: bool | None, pictures: bool) -> None:
@@ -125,8 +129,8 @@ def _optimize(console: Console, file: SceneFile, resume: bool | None, pictures: 
             _draw(console, file, done, gallery)
     names = ", ".join(["result.json", *(path.name for path in (*done.written, *gallery.drawn))])
     console.write(f"results in {file.folder}/: {names}")
-    if done.accurate is not None and not done.accurate.reached:
-        console.write(f"the accuracy was not reached: {done.accurate.reason}")
+    if done.missed:
+        console.write(f"the accuracy was not reached: {done.missed}")
         raise typer.Exit(int(ExitCode.NOT_CONVERGED))
     if not done.result.reason.success:
         console.write(f"not converged: {done.result.reason.value}")
@@ -156,7 +160,10 @@ def _to_accuracy(console: Console, file: SceneFile, task: ShapeTask, resume: boo
     if "csv" in kinds and file.scene.contacts:
         written.append(write_contact_table(found.state, file.folder / "contact.csv"))
     products = sum(level.products for level in found.levels)
-    return _Done(result, last, gridded, last.at(task.start), products, written, found)
+    return _Done(
+        result, last, gridded, last.at(task.start), products, written, found.optimisations,
+        {"first": file.scene, "last": found.state.scene}, "" if found.reached else found.reason,
+    )  # fmt: skip
 
 
 def _minimised(console: Console, file: SceneFile, task: ShapeTask, resume: bool | None) -> _Done:
@@ -177,13 +184,14 @@ def _minimised(console: Console, file: SceneFile, task: ShapeTask, resume: bool 
     if result.reason.success:
         forget(console, checkpoint)
     assert task.problem.first is not None
-    return _Done(result, task.problem, task.problem, task.problem.first, task.problem.products, written)
+    first, products = task.problem.first, task.problem.products
+    return _Done(result, task.problem, task.problem, first, products, written, (result,))
 
 
 def _facts(file: SceneFile, task: ShapeTask, done: _Done) -> dict[str, str]:
     problem, result = done.problem, done.result
     before, after, units = done.before, problem.at(result.x), file.document.units
-    every = (result,) if done.accurate is None else done.accurate.optimisations
+    every = done.optimisations
     evaluations = sum(each.evaluations for each in every)
     drop = (before.value - after.value) / abs(before.value) * 100 if before.value else 0.0
     rows = {
@@ -218,8 +226,8 @@ def _draw(console: Console, file: SceneFile, done: _Done, gallery: Gallery) -> N
         path = file.folder / ("control_net.png" if number == 0 else f"control_net_{number + 1}.png")
         plot_control_net(net, result.x, path, design=number)
         gallery.drawn.append(path)
-    if done.accurate is not None:
-        draw_meshes(file, file.scene, done.accurate.state.scene, gallery)
+    if done.meshes:
+        draw_meshes(file, done.meshes, gallery)
         return
     path = file.folder / "convergence.png"
     plot_convergence(result.history, path, title=file.title, comm=console.comm)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from fenics_contact._cli.console import (
 )
 from fenics_contact._cli.options import checkpoint_of, forget, plan_of_states, resumable, scene_command
 from fenics_contact._cli.view import Gallery, can_draw, draw_meshes, draw_state
+from fenics_contact._scene.scene import Scene
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import LoadStepError
 from fenics_contact.output.files import only_run_in
@@ -41,25 +43,34 @@ def add_to(app: typer.Typer) -> None:
     app.command("run", short_help="solve a scene file, or go through its load steps")(run)
 
 
+@dataclass(frozen=True, eq=False)
+class Found:
+    """States by their titles.
+
+    `meshes`: scenes whose meshes are drawn, by their titles; `missed`: why an accuracy was not reached.
+    """
+
+    states: dict[str, State]
+    meshes: Mapping[str, Scene] = field(default_factory=dict)
+    missed: str = ""
+
+
 def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool) -> None:
     """Compute the equilibrium of a scene file, or its load steps."""
     with only_run_in(file.folder, console.comm):
-        accurate = None
         if file.document.accuracy is not None:
-            accurate = _to_accuracy(console, file)
-            states = {file.title: accurate.state}
+            found = _to_accuracy(console, file)
         else:
-            states = _through_steps(console, file, resume) if file.steps else _at_once(console, file)
+            found = Found(_through_steps(console, file, resume) if file.steps else _at_once(console, file))
         gallery = Gallery()
         if pictures and file.document.output.drawn and can_draw(console, file, gallery):
-            draw_state(console, file, states, gallery)
-            if accurate is not None:
-                draw_meshes(file, file.scene, accurate.state.scene, gallery)
+            draw_state(console, file, found.states, gallery)
+            draw_meshes(file, found.meshes, gallery)
     names = ", ".join(["result.json", *_files(file), *(path.name for path in gallery.drawn)])
     console.write(f"results in {file.folder}/: {names}")
     gallery.require_all()
-    if accurate is not None and not accurate.reached:
-        console.write(f"the accuracy was not reached: {accurate.reason}")
+    if found.missed:
+        console.write(f"the accuracy was not reached: {found.missed}")
         raise typer.Exit(int(ExitCode.NOT_CONVERGED))
 
 
@@ -87,13 +98,14 @@ def _at_once(console: Console, file: SceneFile) -> dict[str, State]:
     return {file.title: state}
 
 
-def _to_accuracy(console: Console, file: SceneFile) -> AccurateResult:
+def _to_accuracy(console: Console, file: SceneFile) -> Found:
     """Solve on finer and finer meshes, print a line for each, and write the files. Collective."""
     result = file.solve_to(table_of_levels(console))
     console.write(f"{result.reason}\n")
     _show(console, file, result.state)
     _write(file, result.state, result)
-    return result
+    meshes = {"first": file.scene, "last": result.state.scene}
+    return Found({file.title: result.state}, meshes, "" if result.reached else result.reason)
 
 
 def table_of_levels(console: Console) -> Callable[[Level], None]:

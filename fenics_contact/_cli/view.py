@@ -94,12 +94,14 @@ def draw_state(
             gallery.drawn.append(path)
 
 
-def draw_meshes(file: SceneFile, first: Scene, last: Scene, gallery: Gallery) -> None:
-    """Draw the meshes on which the way to an accuracy began and ended. Collective."""
+def draw_meshes(file: SceneFile, meshes: Mapping[str, Scene], gallery: Gallery) -> None:
+    """Draw the meshes of scenes, those on which the way to an accuracy began and ended. Collective."""
+    if not meshes:
+        return
     from fenics_contact.pictures.levels import plot_meshes
 
     path = file.folder / "meshes.png"
-    plot_meshes({"first": first, "last": last}, path, title=file.title, comm=file.comm)
+    plot_meshes(meshes, path, title=file.title, comm=file.comm)
     gallery.drawn.append(path)
 
 

@@ -375,15 +375,15 @@ evaluation; None where a trial point was rejected as invalid |
         InvalidInputError: As `write_result` does, or if the problem has not been evaluated.
     """
     first, comm = problem.first, problem.comm
-    best = None if first is None else problem.at(result.x)
-    unheld = () if best is None else best.state.unheld
-    read_off = {} if best is None else _read_off(best.state)
     with together(comm):
         target = checked_name(folder, name, ".json")
-        if first is None or best is None:
+        if first is None:
             raise InvalidInputError(
                 "an optimisation's result needs designs that were evaluated, the problem has none"
             )
+    best = problem.at(result.x)
+    unheld, read_off = best.state.unheld, _read_off(best.state)
+    with together(comm):
         record = {**_head("optimisation", comm), **_state_record(best.state, unheld), **read_off}
         record["counts"]["f_products"] = problem.products
         record["seconds"] = dict(problem.seconds)

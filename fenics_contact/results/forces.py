@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -56,10 +56,10 @@ class NodalForces:
         point = np.array(support.at) + self.moved.get((support.body, support.surface), 0.0)
         return Resultant(force, kinematics.moment_at(force, moment, point, about), about)
 
-    def spring(self, support: RigidSurface, about: np.ndarray) -> Resultant | None:
-        """Return what the springs of a tool exert, about another point; None without any."""
-        exerted = self.springs.get((support.body, support.surface))
-        return None if exerted is None else Resultant(exerted.force, exerted.moment_about(about), about)
+    def exerted(self, support: RigidSurface, about: np.ndarray) -> list[Resultant]:
+        """Return what the springs of a tool exert, about another point; nothing without any."""
+        own, springs = (support.body, support.surface), self.springs.items()
+        return [Resultant(each.force, each.moment_about(about), about) for key, each in springs if key == own]
 
 
 def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndarray) -> NodalForces:
@@ -310,6 +310,16 @@ def resultant(
     return Resultant(*kinematics.resultant(forces, places, about), about, surface)
 
 
+def moments_about(about: GivenVector | np.ndarray | None, dim: int) -> Callable[..., np.ndarray]:
+    """Return what chooses the point of moments: the one given, or the one that a function finds.
+
+    It takes the function and its arguments.
+    """
+    if about is None:
+        return lambda own, *of: own(*of)
+    return lambda own, *of: point_of(about, dim)
+
+
 def point_of(given: GivenVector | np.ndarray, dim: int) -> np.ndarray:
     """Return a point as an array, shape (dim,)."""
     point = np.asarray(given, dtype=np.float64)
@@ -337,14 +347,14 @@ def support_reactions(
     That of a rigid surface is less the load at its point, to which it refers by default, and springs.
     """
     scene = torn.scene
-    shares = support_shares(scene, NodeNumbers.of(scene))
+    shares, place = support_shares(scene, NodeNumbers.of(scene)), moments_about(about, scene.dim)
     entries = []
     for support, share in zip(scene.supports, shares, strict=True):
         surface = Surface(support.body, support.surface)
-        point = support.reference(scene) if about is None else point_of(about, scene.dim)
+        point = place(support.reference, scene)
         total = resultant(share.of(forces.reaction), forces.places, point, scene.kinematics, surface)
         for rigid in support.rigid_surfaces:
-            if (spring := forces.spring(rigid, point)) is not None:
+            for spring in forces.exerted(rigid, point):
                 total = total - spring
             total = total - forces.point_load(rigid, point, scene.kinematics)
             if support.body in _uncarried(torn):
@@ -376,10 +386,10 @@ def foundation_forces(
     scene: Scene, forces: NodalForces, about: GivenVector | np.ndarray | None
 ) -> Resultants:
     """Return the force of every elastic foundation on its body, about a point or its centroid."""
-    entries = []
+    entries, place = [], moments_about(about, scene.dim)
     for foundation, force in zip(scene.foundations, forces.foundations, strict=True):
         surface = Surface(foundation.body, foundation.surface)
-        point = centroid(scene, surface) if about is None else point_of(about, scene.dim)
+        point = place(centroid, scene, surface)
         entries.append(resultant(force, forces.places, point, scene.kinematics, surface))
     return Resultants("foundation", tuple(entries), tuple(each.place for each in scene.foundations))
 
@@ -519,20 +529,23 @@ def force_balance(
     Radial forces all around an axis balance each other. `least`: a force below which bodies count as free of
     forces.
     """
-    if about is None:
+
+    def middle() -> np.ndarray:
         carriers = [body.is_rigid for body in torn.scene.bodies.values()]
         of_tool = np.repeat(carriers, np.diff(torn.decomposition.tearing.node_offset))
-    point = _middle(forces.places[~of_tool]) if about is None else point_of(about, torn.scene.dim)
+        return _middle(forces.places[~of_tool])
+
+    point = moments_about(about, torn.scene.dim)(middle)
     parts, kinematics = _parts(torn, forces), torn.scene.kinematics
     resultants = {
         name: resultant(force * kinematics.balanced, forces.places, point, kinematics)
         for name, force in parts.items()
     }
     for rigid in torn.scene.rigid_surfaces:  # the load at its point comes in through its nodes
-        load, spring = forces.point_load(rigid, point, kinematics), forces.spring(rigid, point)
+        load = forces.point_load(rigid, point, kinematics)
         resultants["loads"] += load
         resultants["reactions"] -= load
-        if spring is not None:
+        for spring in forces.exerted(rigid, point):
             resultants["beds"] += spring
             resultants["reactions"] -= spring
     arms = kinematics.arms(forces.places, point)
@@ -591,7 +604,7 @@ def pair_resultants(
     torn: TornSystem, forces: NodalForces, about: GivenVector | np.ndarray | None
 ) -> PairResultants:
     """Return force and moment on the slave of every pair, about a point or the centroid of its surface."""
-    scene = torn.scene
+    scene, place = torn.scene, moments_about(about, torn.scene.dim)
 
     def of(
         kind: str, pairs: Sequence[ContactPair | AnyTie], points: ContactPoints, force: np.ndarray
@@ -599,7 +612,7 @@ def pair_resultants(
         found = []
         for number, pair in enumerate(pairs):
             mine = np.flatnonzero(points.pair == number)
-            point = centroid(scene, pair.slave) if about is None else point_of(about, scene.dim)
+            point = place(centroid, scene, pair.slave)
             places = points.own[mine] @ forces.places
             found.append(resultant(force[mine], places, point, scene.kinematics, pair.slave))
         return Resultants(kind, tuple(found), tuple(pair.place for pair in pairs))

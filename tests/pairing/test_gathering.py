@@ -18,6 +18,7 @@ from fenics_contact import (
     Traction,
     solve_scene,
 )
+from fenics_contact._pairing.mortar.gathering import CondensedDualBasis, OwnDualBasis
 from fenics_contact._pairing.mortar.points import MortarPoints
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._surfaces.facets import FacetedSurface
@@ -69,7 +70,7 @@ def test_constant_tractions_and_linear_fields_stay_exact(kinds: tuple[str, str])
     master = plate(kinds[1], 7, low=low, turn=0.25)
     met = met_by(slave, master)
     gathering, area = met.gathering, met.coupling.area
-    assert gathering is not None
+    assert isinstance(gathering, CondensedDualBasis)
     assert 0 < np.count_nonzero(gathering.gathers) < len(area)
     assert len(area) < len(gathering.whole.node)
     np.testing.assert_allclose(gathering.part.sum(axis=0), 1.0, atol=1e-14)
@@ -88,7 +89,7 @@ def test_a_master_no_wider_than_two_facets_still_bears_a_body_that_tips(kinds: t
     slave = plate(kinds[0], 4, up=False, low=-0.5, high=0.5, height=0.1, uneven=0.0)
     master = plate(kinds[1], 2, low=-0.05, high=0.05)
     met = met_by(slave, master)
-    assert met.gathering is None
+    assert isinstance(met.gathering, OwnDualBasis)
     assert met.coupling.node.size >= slave.dim
 
 
@@ -142,10 +143,10 @@ def spectrum(points: MortarPoints) -> np.ndarray:
     coupling, gathering = points.coupling, points.gathering
     assert coupling.own is not None
     own = coupling.own.toarray()
-    if gathering is None:
-        own = own[:, coupling.node]
-    else:
+    if isinstance(gathering, CondensedDualBasis):
         own = own[:, gathering.whole.node] @ gathering.part.toarray().T
+    else:
+        own = own[:, coupling.node]
     root = np.sqrt(coupling.area)
     matrix = root[:, None] * own / root
     return np.linalg.eigvalsh((matrix + matrix.T) / 2)
@@ -163,7 +164,8 @@ def test_pressures_of_quadratic_slaves_are_determined_wherever_the_rim_of_the_ma
     for end in 0.75 + 0.25 * np.array([0.003, 0.03, 0.1, 0.3, 0.45, 0.55, 0.7, 0.97]):
         points = met_by(slave, plate(kinds[1], 3, low=-0.2, high=float(end)))
         values.append(spectrum(points))
-        whole = points.coupling if points.gathering is None else points.gathering.whole
-        plain.append(spectrum(MortarPoints(slave, points.master, whole, None, None)))
+        whole = points.gathering.whole
+        alone = OwnDualBasis(whole, len(whole.node))
+        plain.append(spectrum(MortarPoints(slave, points.master, whole, alone, None)))
     assert np.concatenate(plain).min() < 0.6, "covered facets alone are close to their nodes"
     assert 0.3 < np.concatenate(values).min() < np.concatenate(values).max() < 2.2

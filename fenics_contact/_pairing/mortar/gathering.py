@@ -18,11 +18,50 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.mortar.by_master import NormalsPulledBack
 from fenics_contact._pairing.mortar.coupling import MortarCoupling
+from fenics_contact._pairing.mortar.derivatives import SurfaceDerivatives, add_normals, mortar_pulled_back
 from fenics_contact._pairing.mortar.normals import normals_at
 from fenics_contact._surfaces.facets import FacetedSurface
+
+
+@dataclass(frozen=True)
+class OwnDualBasis:
+    """Points that have no dual functions but their own, with the members of a `CondensedDualBasis`.
+
+    Attributes:
+        whole: The coupling of all nodes that face the master.
+        count: Number of points.
+    """
+
+    whole: MortarCoupling
+    count: int
+
+    def chosen(self, points: np.ndarray) -> OwnDualBasis:
+        """Return some of the points, by indices."""
+        return replace(self, count=len(points))
+
+    @property
+    def gathers(self) -> np.ndarray:
+        """Whether each point has more than its own dual function, shape (n,)."""
+        return np.zeros(self.count, dtype=bool)
+
+    def coupling(self, slave: FacetedSurface, master: FacetedSurface) -> MortarCoupling:
+        """Return the coupling at the points."""
+        return self.whole
+
+    def by_surfaces(
+        self,
+        sides: tuple[FacetedSurface, FacetedSurface],
+        coupling: MortarCoupling,
+        by: CouplingDerivatives,
+        comm: MPI.Comm | None,
+    ) -> tuple[SurfaceDerivatives, SurfaceDerivatives]:
+        """Vector-Jacobian product of the coupling at the points by slave and master. Collective."""
+        return mortar_pulled_back(*sides, coupling, by, comm)
 
 
 @dataclass(frozen=True)
@@ -48,8 +87,8 @@ class CondensedDualBasis:
         slave: FacetedSurface,
         bearing: np.ndarray | None = None,
         least_share: float = 0.05,
-    ) -> CondensedDualBasis | None:
-        """Return which points gather what; None if all nodes face the master well and can move.
+    ) -> CondensedDualBasis | OwnDualBasis:
+        """Return which points gather what, nothing if all nodes face the master well and can move.
 
         A node without a neighbour that does keeps its multiplier, and so do all where the rest could not
         bear a body that tips.
@@ -65,7 +104,7 @@ class CondensedDualBasis:
         facets = np.asarray(shared.sum(axis=0)).ravel()
         points = np.union1d(np.flatnonzero(well), hardly[facets == 0.0])
         if len(points) == len(well) or not _spans_rotations(slave, whole.node[points]):
-            return None
+            return OwnDualBasis(whole, len(whole.node))
         shares = (shared @ sp.diags(1.0 / np.maximum(facets, 1.0))).tocoo()
         count = len(points)
         place = np.searchsorted(points, np.flatnonzero(well)[shares.row])
@@ -76,7 +115,7 @@ class CondensedDualBasis:
         return cls(whole, points, part, scaled_rows(own, 1.0 / np.asarray(own.sum(axis=1)).ravel()))
 
     def chosen(self, points: np.ndarray) -> CondensedDualBasis:
-        """Return some of the points, by indices or a mask."""
+        """Return some of the points, by indices."""
         return replace(self, point=self.point[points], part=self.part[points], own=self.own[points])
 
     @property
@@ -101,6 +140,22 @@ class CondensedDualBasis:
         if of_whole is not None:
             return (own @ of_whole).tocsr()
         return sp.csr_matrix((own.data, self.whole.node[own.indices], own.indptr), (own.shape[0], n_nodes))
+
+    def by_surfaces(
+        self,
+        sides: tuple[FacetedSurface, FacetedSurface],
+        coupling: MortarCoupling,
+        by: CouplingDerivatives,
+        comm: MPI.Comm | None,
+    ) -> tuple[SurfaceDerivatives, SurfaceDerivatives]:
+        """Vector-Jacobian product of the coupling at the points by slave and master. Collective."""
+        slave, master = sides
+        turned = NormalsPulledBack.of(slave, master, coupling, by)
+        places = slave.points, master.points
+        by_whole = self.pulled_back(coupling, turned.with_weights(by, master), places)
+        found = mortar_pulled_back(slave, master, self.whole, by_whole, comm)
+        add_normals(found, turned, coupling, by)
+        return found
 
     def pulled_back(
         self, coupling: MortarCoupling, by: CouplingDerivatives, places: tuple[np.ndarray, np.ndarray]

@@ -21,10 +21,10 @@ import scipy.sparse as sp
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
-from fenics_contact._pairing.mortar.by_master import NormalsPulledBack, with_inclined
+from fenics_contact._pairing.mortar.by_master import with_inclined
 from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
-from fenics_contact._pairing.mortar.derivatives import SurfaceDerivatives, add_normals, mortar_pulled_back
-from fenics_contact._pairing.mortar.gathering import CondensedDualBasis
+from fenics_contact._pairing.mortar.derivatives import SurfaceDerivatives
+from fenics_contact._pairing.mortar.gathering import CondensedDualBasis, OwnDualBasis
 from fenics_contact._pairing.projection import shared_projection
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection
@@ -129,14 +129,14 @@ class MortarPoints:
 
     Attributes:
         coupling: Their coupling, at some of its nodes.
-        gathering: What the nodes gather of others that hardly face the master; None if there are none.
+        gathering: What the nodes gather of others that hardly face the master.
         closable: Gaps that linear displacements can close; None where both surfaces are their facets.
     """
 
     slave: FacetedSurface
     master: FacetedSurface
     coupling: MortarCoupling
-    gathering: CondensedDualBasis | None
+    gathering: CondensedDualBasis | OwnDualBasis
     closable: ClosableGaps | None
 
     @classmethod
@@ -157,13 +157,12 @@ class MortarPoints:
         comm = comm or MPI.COMM_SELF
         slave, coupling = with_inclined(slave, master, mortar_coupling(slave, master, comm))
         gathering = CondensedDualBasis.of(coupling, slave, bearing if movable is None else movable)
-        if gathering is not None:
-            coupling = gathering.coupling(slave, master)
+        coupling = gathering.coupling(slave, master)
         chosen = np.flatnonzero(bearing[coupling.node])
         coupling = coupling.part(chosen)
-        gathering = None if gathering is None else gathering.chosen(chosen)
+        gathering = gathering.chosen(chosen)
         flat, closable = slave.relief is None and master.relief is None, None
-        alone = np.full(len(chosen), not flat) if gathering is None or flat else ~gathering.gathers
+        alone = np.zeros(len(chosen), dtype=bool) if flat else ~gathering.gathers
         creased = _at_creases(slave, master, coupling)
         if not flat or creased.any():
             closable = closable_gaps(slave, master, coupling, share, comm, alone, creased)
@@ -193,12 +192,4 @@ class MortarPoints:
         self, by: CouplingDerivatives, comm: MPI.Comm | None = None
     ) -> tuple[SurfaceDerivatives, SurfaceDerivatives]:
         """Vector-Jacobian product of the coupling by slave and master. Collective on ``comm``."""
-        slave, master, coupling, gathering = self.slave, self.master, self.coupling, self.gathering
-        if gathering is None:
-            return mortar_pulled_back(slave, master, coupling, by, comm)
-        turned = NormalsPulledBack.of(slave, master, coupling, by)
-        whole, places = gathering.whole, (slave.points, master.points)
-        by_whole = gathering.pulled_back(coupling, turned.with_weights(by, master), places)
-        sides = mortar_pulled_back(slave, master, whole, by_whole, comm)
-        add_normals(sides, turned, coupling, by)
-        return sides
+        return self.gathering.by_surfaces((self.slave, self.master), self.coupling, by, comm)
