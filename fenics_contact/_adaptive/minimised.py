@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -141,7 +142,7 @@ def minimize_to(
     settings = {"bounds": bounds, "scale": scale, "restore": restore}
     start = np.array(x0, dtype=float)
     way = _Descent(problem, start, relative_error, limits or Limits(), method or BundleTrust(), settings)
-    way.constraints = constraints
+    way.constrained = partial(_constraints_on, constraints)
     found = followed(way, problem.contact.on(problem.scene, problem.contact.partitions), callback)
     return AccurateDesign(**vars(found), problems=tuple(way.problems), optimisations=tuple(way.optimisations))
 
@@ -167,10 +168,21 @@ def _check(problem: ShapeProblem, constraints: ConstraintsOf | None) -> None:
             )
 
 
-class _Descent(AdaptiveLoop):
-    """The levels so far of an optimisation, each from the design of the one before."""
+def _constraints_on(given: Any, shape: ShapeProblem) -> Any:
+    """Return constraints on a mesh."""
+    if not callable(given):
+        return given
+    with user_code("the constraints of minimize_to"):
+        return given(shape)
 
-    constraints: ConstraintsOf | None = None
+
+class _Descent(AdaptiveLoop):
+    """The levels so far of an optimisation, each from the design of the one before.
+
+    `constrained`: returns the constraints on a mesh.
+    """
+
+    constrained: Callable[[ShapeProblem], Any]
 
     def __init__(
         self,
@@ -241,11 +253,7 @@ class _Descent(AdaptiveLoop):
         """Run the method on a mesh. Collective."""
         reach = self._method.reach or 2.0
         method = replace(self._method, tolerance=tolerance, first_step=self._first_step, reach=reach)
-        given: Any = self.constraints
-        if callable(given):
-            with user_code("the constraints of minimize_to"):
-                given = given(shape)
-        result = minimize(shape, self._x, method, constraints=given, **self._settings)
+        result = minimize(shape, self._x, method, constraints=self.constrained(shape), **self._settings)
         steps = [record.step_length for record in result.history if record.kind is StepKind.SERIOUS]
         if steps:
             length = pose(shape, result.x, self._settings["bounds"], scale=self._settings["scale"]).length

@@ -135,6 +135,10 @@ def _orientations(grid: np.ndarray) -> np.ndarray:
     return np.cross(np.gradient(grid, axis=0), np.gradient(grid, axis=1))
 
 
+Plane: TypeAlias = tuple[np.ndarray, float]
+"""Unit normal, and distance from the origin along it, [length]."""
+
+
 @dataclass(frozen=True)
 class Edge:
     """An edge of a flat side.
@@ -159,15 +163,13 @@ class Edge:
 class FlatSide:
     """A flat side: its edges in closed loops, that around it first, and its plane.
 
-    `off`: largest distance of the moved nodes from it, in the plane from its straight edges; `normal`: unit
-    normal out of the body; None in the plane; `level`: distance of its plane from the origin along the
-    normal.
+    `off`: largest distance of the moved nodes from it, in the plane from its straight edges; `planes`: that
+    in which it lies, with the normal out of the body; none of a plane body.
     """
 
     loops: list[list[Edge]]
     off: float
-    normal: np.ndarray | None = None
-    level: float = 0.0
+    planes: tuple[Plane, ...] = ()
 
 
 def flat_sides(
@@ -203,7 +205,7 @@ def flat_sides(
         edges = np.stack([facets[mine], np.roll(facets[mine], -1, axis=1)], axis=2)[behind != side]
         loops = _loops(moved, edges, behind[behind != side], surfaces)
         off = float(np.abs(moved[facets[mine]] @ normal - level).max())
-        found.append(FlatSide(loops, off, normal, level))
+        found.append(FlatSide(loops, off, ((normal, level),)))
     return found
 
 
@@ -279,18 +281,13 @@ def _lines(surface: DesignSurface) -> tuple[np.ndarray, ...]:
     return (grid,) if grid.ndim == 1 else (grid[0], grid[-1], grid[:, 0], grid[:, -1])
 
 
-Plane: TypeAlias = tuple[np.ndarray, float]
-"""Unit normal, and distance from the origin along it, [length]."""
-
-
 def corners_in_planes(points: np.ndarray, sides: Sequence[FlatSide]) -> dict[int, np.ndarray]:
     """Return the position of every corner of flat sides in all of their planes, by node."""
     planes: dict[int, list[Plane]] = {}
     for side in sides:
         for edge in (edge for loop in side.loops for edge in loop):
             known = planes.setdefault(int(edge.nodes[0]), [])
-            if side.normal is not None:
-                known.append((side.normal, side.level))
+            known += side.planes
     return {node: _onto(points[node], known) for node, known in planes.items()}
 
 
@@ -299,8 +296,8 @@ def rims_in_planes(fits: Sequence[SplineFit], sides: Sequence[FlatSide], toleran
     planes: list[dict[int, Plane]] = [{} for _ in fits]
     for side in sides:
         for edge in (edge for loop in side.loops for edge in loop):
-            if edge.surface is not None and side.normal is not None:
-                planes[edge.surface][edge.side] = side.normal, side.level
+            if edge.surface is not None:
+                planes[edge.surface].update({edge.side: plane for plane in side.planes})
     return [_put(fit, known, tolerance) for fit, known in zip(fits, planes, strict=True)]
 
 
