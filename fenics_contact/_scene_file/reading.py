@@ -41,6 +41,7 @@ from fenics_contact._scene_file.source import (
     Mistake,
     SceneFileError,
     Source,
+    collected,
     located,
     parse,
     parts_of,
@@ -175,7 +176,7 @@ class Builder:
 
     def _at(self, *path: str | int) -> AbstractContextManager[None]:
         """Collect an error of the block as a mistake at a key."""
-        return located(self._source, path, self._mistakes)
+        return collected(self._source, path, self._mistakes)
 
     def _check(self) -> None:
         """Raise on all ranks if one has a mistake, such as a file that only it cannot read. Collective."""
@@ -196,7 +197,7 @@ def with_fields_read(source: Source, document: AnyDocument, comm: MPI.Comm) -> A
     read: dict[tuple[Any, ...], Any] = {}
     for path, part in parts_of(document, OfFile):  # type: ignore[type-abstract]
         if part.key not in read:
-            with located(source, path, mistakes):
+            with collected(source, path, mistakes):
                 read[part.key] = part.read(source.folder, comm)
     with together(comm):
         if mistakes:
@@ -593,12 +594,13 @@ def _(scene: str | Path, comm: MPI.Comm) -> Source:
 def _text_of(path: Path) -> str:
     require_file(path, "a scene file")
     try:
-        content = path.read_bytes() if path.stat().st_size <= LARGEST else None
+        large = path.stat().st_size > LARGEST
+        content = b"" if large else path.read_bytes()
     except OSError as error:
         raise InvalidInputError(
             f"the scene file '{path}' must be readable: {error.strerror or error}"
         ) from error
-    if content is None:
+    if large:
         raise InvalidInputError(
             f"the scene file '{path}' must have at most {LARGEST // 10**6} MB: put meshes into their own "
             "files"

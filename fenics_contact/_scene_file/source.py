@@ -438,19 +438,22 @@ def _parsed(override: str) -> tuple[list[str], Any]:
 
 
 @contextmanager
-def located(source: Source, path: Path, mistakes: list[Mistake] | None = None) -> Iterator[None]:
-    """Make an error of the block a mistake at a key.
-
-    `mistakes`: collects the mistake, which is raised unless given.
-    """
+def located(source: Source, path: Path) -> Iterator[None]:
+    """Make an error of the block a mistake at a key."""
     try:
         yield
-    except SceneFileError as error:
-        if mistakes is None:
-            raise
-        mistakes.extend(error.mistakes)
+    except SceneFileError:
+        raise
     except InvalidInputError as error:
         mistake = source.mistake(path, f"{written(path)}: {error}")
-        if mistakes is None:
-            raise SceneFileError(source.name, [mistake]) from error
-        mistakes.append(mistake)
+        raise SceneFileError(source.name, [mistake]) from error
+
+
+@contextmanager
+def collected(source: Source, path: Path, mistakes: list[Mistake]) -> Iterator[None]:
+    """Add an error of the block to the mistakes, at a key."""
+    try:
+        with located(source, path):
+            yield
+    except SceneFileError as error:
+        mistakes.extend(error.mistakes)

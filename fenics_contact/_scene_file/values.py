@@ -397,7 +397,7 @@ def one_of(
     *tables: Any,
     default: str = "",
     other: Any = None,
-    when: Callable[[Any], bool] | None = None,
+    when: Callable[[Any], bool] = lambda table: False,
     called: str = "",
 ) -> Read:
     """Discriminate tables by the value of one key."""
@@ -406,7 +406,7 @@ def one_of(
     def tag(value: Any) -> str | None:
         if not isinstance(value, Mapping):
             return None
-        if when is not None and when(value):
+        if when(value):
             return MARK
         kind = value.get(key, default)
         return f"{MARK}{kind}" if isinstance(kind, str) and kind in kinds else None
