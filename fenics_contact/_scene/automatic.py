@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.checks import check_known, check_positive
 from fenics_contact._scene.corners import exchanged, is_held, with_corner_as_slave
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
 from fenics_contact._scene.surface_laws import ClosureLaw, check_closing
@@ -83,11 +84,9 @@ class AutomaticContact(Sequence[ContactPair]):
 
     def __post_init__(self) -> None:
         """Raise unless the distance is positive and finite, and the closure rises with the pressure."""
-        if self.distance is not None and not 0.0 < self.distance < np.inf:
-            raise InvalidInputError(
-                f"AutomaticContact.distance must be positive and finite, got {self.distance!r}: give the "
-                "largest gap that may close, or None"
-            )
+        if self.distance is not None:
+            remedy = "give the largest gap that may close, or None"
+            check_positive("AutomaticContact.distance", self.distance, remedy)
         if self.closure is not None:
             check_closing(self.closure)
 
@@ -127,11 +126,8 @@ class AutomaticContact(Sequence[ContactPair]):
 
     def _with_boundary(self, meshes: dict[str, BodyMesh], name: str) -> BodyMesh:
         """Return a body that has a surface "boundary"."""
-        if name not in meshes:
-            raise InvalidInputError(
-                f"AutomaticContact.self_contact needs names of bodies of the scene, {', '.join(meshes)}, got "
-                f"{name!r}: correct or remove it"
-            )
+        words = f"AutomaticContact.self_contact names body {name!r}, the scene has"
+        check_known(name, meshes, words)
         mesh = meshes[name]
         if "boundary" in mesh.surfaces:
             raise InvalidInputError(

@@ -75,8 +75,7 @@ class Body:
         _check_integration(self.mesh, self.integration)
         if self.torsion and not self.axisymmetric:
             raise InvalidInputError(
-                "torsion=True needs a body of revolution, got axisymmetric=False: give axisymmetric=True, "
-                "too, or leave torsion out"
+                "torsion=True needs a body of revolution: give axisymmetric=True, too, or leave torsion out"
             )
         if self.axisymmetric:
             _check_half_section(self.mesh)
@@ -84,10 +83,10 @@ class Body:
             _check_regions(self.mesh, self.material)
         for material in self.materials:
             _check_material(material, self.kinematics)
-        if self.has_thickness and any(thickness_of(each) is None for each in self.materials):
+        known = [thickness_of(each) for each in self.materials]
+        if self.has_thickness and None in known:
             raise InvalidInputError(
-                "all materials of a body must have a thickness or none, got "
-                f"{[thickness_of(each) for each in self.materials]}: give it to the others, too"
+                f"all materials of a body must have a thickness or none, got {known}: give it to the others"
             )
         for material in self.materials:
             if self.axisymmetric and not self.torsion:
@@ -212,32 +211,30 @@ def _check_regions(mesh: BodyMesh, materials: Mapping[str, Material]) -> None:
 
 
 def _check_integration(mesh: BodyMesh, integration: str) -> None:
+    words = "reduced integration needs hexahedra of 20 or quadrilaterals of 8 nodes"
     if integration == "reduced" and not mesh.centres:
         raise InvalidInputError(
-            "reduced integration needs hexahedra of 20 or quadrilaterals of 8 nodes, got "
-            f"{mesh.cells_in_words}, which deform without energy by it: leave it out, or take "
+            f"{words}, got {mesh.cells_in_words}, which deform without energy by it: leave it out, or take "
             "serendipity(mesh)"
         )
     if integration == "reduced" and has_collapsed(mesh.cells, mesh.dim):
         raise InvalidInputError(
-            "reduced integration needs hexahedra of 20 or quadrilaterals of 8 nodes alone, got "
-            f"{mesh.cells_in_words}: in other shapes its points depend on the order of their nodes; leave it "
-            "out, or make the others a body of their own and glue it on"
+            f"{words} alone, as in other cells it depends on the order of nodes, got {mesh.cells_in_words}: "
+            "leave it out, or make the others a body of their own and glue it on"
         )
 
 
 def _check_half_section(mesh: BodyMesh) -> None:
     if mesh.dim != 2:
         raise InvalidInputError(
-            "axisymmetric=True needs a plane mesh, half the section of the body with the coordinates r and "
-            f"z, got one in {mesh.dim} dimensions: give the section, or leave axisymmetric out"
+            "axisymmetric=True needs a plane mesh, half the section with the coordinates r and z, got one in "
+            f"{mesh.dim} dimensions: give the section, or leave axisymmetric out"
         )
     left = mesh.points[:, 0] < -computed_rounding(mesh.points)
     if left.any():
         raise InvalidInputError(
-            "the first coordinate of a body of revolution is the radius, which must not be negative, "
-            f"{counted(int(left.sum()), 'node lies', 'nodes lie')} left of the axis, down to "
-            f"{mesh.points[:, 0].min():.3g}: give the half of the section right of the axis r = 0"
+            f"radii must not be negative, {counted(int(left.sum()), 'node lies', 'nodes lie')} left of the "
+            f"axis, down to {mesh.points[:, 0].min():.3g}: give the half of the section right of it, r ≥ 0"
         )
 
 
@@ -249,7 +246,7 @@ def _needed(material: type) -> list[str]:
 def _check_material(material: Material, kinematics: Kinematics) -> None:
     if isinstance(material, type):
         raise InvalidInputError(
-            f"a material must have its constants, got the class {material.__name__}: write "
+            "a material must have its constants, got a class: write "
             f"{material.__name__}({', '.join(_needed(material))})"
         )
     name = type(material).__name__
@@ -258,13 +255,13 @@ def _check_material(material: Material, kinematics: Kinematics) -> None:
         missing = [part for part in needed if not hasattr(material, part)]
     if missing:
         raise InvalidInputError(
-            f"a material must have dims, parameters, stress, stiffness and kernel, {name} lacks {missing}: "
+            f"a material must have {', '.join(needed)}, {name} lacks {missing}: "
             "derive it from Elasticity or EnergyModel"
         )
     if not isinstance(material.parameters, Sequence | np.ndarray):
         raise InvalidInputError(
-            f"parameters of {name} must be a sequence of numbers, got {brief(material.parameters)}: "
-            "return a tuple, with a comma behind a single one"
+            f"parameters of {name} must be a sequence of numbers, got {brief(material.parameters)}: return a "
+            "tuple, with a comma behind a single one"
         )
     if kinematics.material_dim not in material.dims:
         raise InvalidInputError(kinematics.needed_material.format(name=name, dims=material.dims))
@@ -272,8 +269,7 @@ def _check_material(material: Material, kinematics: Kinematics) -> None:
         hash(material)
     except TypeError as error:
         raise InvalidInputError(
-            f"a material must be hashable, {name} is not ({error}): write it as a frozen dataclass of "
-            "numbers and tuples"
+            f"{name} must be hashable ({error}): write it as a frozen dataclass of numbers and tuples"
         ) from error
 
 
@@ -284,9 +280,8 @@ def _check_symmetric_axes(material: Material, rounding: float = 1e-9) -> None:
         coupling = np.abs(stiffness[np.ix_([0, 1, 2, 5], [3, 4])]).max()
         if coupling > rounding * np.abs(stiffness).max():
             raise InvalidInputError(
-                f"a body of revolution cannot twist, but the axes of {type(material).__name__} are inclined "
-                "to the circumference, its third axis: let one of them point along it, or give the body "
-                "torsion=True"
+                f"a body of revolution cannot twist, but axes of {type(material).__name__} are inclined to "
+                "the circumference, its third axis: let one point along it, or give the body torsion=True"
             )
 
 
@@ -300,6 +295,5 @@ def _check_mean_dilatation(material: Material, mesh: BodyMesh) -> None:
         cells = CELL_TYPES[mesh.cell_type].plural
         raise InvalidInputError(
             f"mean_dilatation of {type(material).__name__} needs cells in which the volume change varies, "
-            f"got a mesh of {cells}, in which it is constant and locks all the same: use hexahedra "
-            "(quadrilaterals in the plane) or quadratic cells, fenics_contact.mesh.quadratic"
+            f"got {cells}, which lock: use hexahedra, quadrilaterals or fenics_contact.mesh.quadratic"
         )

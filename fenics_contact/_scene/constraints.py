@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.checks import GivenVector, brief, checked, floats
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.checks import check_known, plain_numbers
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.part import Around, Part, body_of
 from fenics_contact.errors import InvalidInputError
@@ -65,15 +66,12 @@ class ConstraintTerm:
             number = self._array("equation", np.int64, (0, 1))
             if (number < 0).any():
                 raise InvalidInputError(
-                    f"ConstraintTerm.equation must count from 0, got {brief(self.equation)}: correct it"
+                    f"ConstraintTerm.equation must count from 0, got {brief(self.equation)}"
                 )
             self._set("equation", number if number.ndim else int(number))
         for name in ("direction", "factor"):
             if not isinstance(getattr(self, name), str) and not np.any(getattr(self, name)):
-                raise InvalidInputError(
-                    f"ConstraintTerm.{name} must not be zero, got {brief(getattr(self, name))}: leave the "
-                    "term out"
-                )
+                raise InvalidInputError(f"ConstraintTerm.{name} must not be zero: leave the term out")
         sizes = {len(each) for each in self._by_node}
         if len(sizes) > 1:
             raise InvalidInputError(
@@ -193,12 +191,10 @@ class LinearConstraint(Part):
             )
         for term in self.terms:
             mesh = body_of(scene, term.body, "ConstraintTerm").mesh
-            known = [*mesh.surfaces, *mesh.node_sets]
-            if term.set_name and term.set_name not in known:
-                raise InvalidInputError(
-                    f"ConstraintTerm names nodes {term.nodes!r} of body {term.body!r}, which has "
-                    f"{sorted(known)}: use one of them, or numbers"
-                )
+            if term.set_name:
+                words = f"ConstraintTerm names nodes {term.nodes!r} of body {term.body!r}, which has"
+                known = [*mesh.surfaces, *mesh.node_sets]
+                check_known(term.set_name, known, words, "use one of them, or numbers")
         self.entries(scene.bodies)
 
     @property
@@ -291,9 +287,8 @@ class LinearConstraint(Part):
         if away.max() > near * size or len(np.unique(place)) < len(place):
             at = ", ".join(f"{x:.6g}" for x in start[int(np.argmax(away))])
             raise InvalidInputError(
-                f"nodes of LinearConstraint {self.label!r} must have partners where a translation takes "
-                f"them, but that at ({at}) has none within {near * size:.3g}: mesh both sides alike, or "
-                "take a Tie"
+                f"LinearConstraint {self.label!r} needs partners of all translated nodes, that at ({at}) has "
+                f"none within {near * size:.3g}: mesh both sides alike, or take a Tie"
             )
         return np.asarray(place)
 
@@ -318,7 +313,7 @@ def _values(value: float | Sequence[float], label: str) -> float | GivenVector:
             f"the value of LinearConstraint {label!r} must be a finite number, or one for each equation, got "
             f"{brief(value)}: give [length] where factors have no unit"
         )
-    return floats(numbers) if numbers.ndim else float(numbers)
+    return plain_numbers(numbers)
 
 
 def with_values(
@@ -331,11 +326,7 @@ def with_values(
     """
     known = [each.label for each in constraints]
     for name in values:
-        if name not in known:
-            raise InvalidInputError(
-                f"LoadStep.constraints names {name!r}, the scene has {', '.join(map(repr, known)) or 'none'}:"
-                " use one of these names"
-            )
+        check_known(name, known, f"LoadStep.constraints names {name!r}, the scene has")
     return tuple(
         each.with_value(values[each.label]) if each.label in values else each for each in constraints
     )
@@ -352,6 +343,6 @@ def require_refinable(constraints: Sequence[LinearConstraint], bodies: Mapping[s
         arrays = any(isinstance(part, np.ndarray) for t in each.terms for part in (t.nodes, *t._by_node))
         if arrays or (each.paired == "order" and len(several) > 1):
             raise InvalidInputError(
-                f"meshes with LinearConstraint {each.label!r} cannot be refined: it is by numbers or the "
-                "order of nodes, which change; name node sets and surfaces, and pair several by 'translation'"
+                f"meshes with LinearConstraint {each.label!r} cannot be refined, as numbers and order of "
+                "nodes change: name node sets and surfaces, and pair several by 'translation'"
             )

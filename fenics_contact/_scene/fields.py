@@ -13,8 +13,9 @@ import numpy as np
 from scipy.spatial import KDTree
 from ufl.core.expr import Expr
 
-from fenics_contact._base.checks import LARGEST, checked, naming_arguments, require_file
+from fenics_contact._base.checks import LARGEST, GivenVector, checked, floats, naming_arguments, require_file
 from fenics_contact._base.display import displayed
+from fenics_contact._scene.checks import check_positive
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.errors.ranks import on_root_then_bcast
@@ -85,13 +86,16 @@ def checked_vector(name: str, value: Any) -> Any:
     """Return numbers as a tuple of floats, a function or UFL as it is."""
     if isinstance(value, Ufl) or callable(value):
         return value
+    return numbers_of_vector(name, value, "give one for x, y and z, or a function of the points")
+
+
+def numbers_of_vector(name: str, value: Any, remedy: str) -> GivenVector:
+    """Return a vector that cannot depend on position as a tuple of floats."""
     array = finite_numbers(value)
-    if array is None or array.shape not in ((2,), (3,)):
-        raise InvalidInputError(
-            f"{name} must be three finite numbers (two for a plane body), got {value!r}: give one for x, y "
-            "and z, or a function of the points"
-        )
-    return tuple(float(component) for component in array)
+    if array.shape not in ((2,), (3,)):
+        needed = "must be three finite numbers (two for a plane body)"
+        raise InvalidInputError(f"{name} {needed}, got {value!r}: {remedy}")
+    return floats(array)
 
 
 def checked_scalar(name: str, value: Any) -> Any:
@@ -99,20 +103,24 @@ def checked_scalar(name: str, value: Any) -> Any:
     if isinstance(value, Ufl) or callable(value):
         return value
     array = finite_numbers(value)
-    if array is None or array.shape != ():
+    if array.shape != ():
         raise InvalidInputError(
             f"{name} must be a finite number, got {value!r}: give a number or a function of the points"
         )
     return float(array)
 
 
-def finite_numbers(value: Any) -> np.ndarray | None:
-    """Return a value as an array of floats, None if it is something other than numbers below 1e60."""
+#: Stands for what is something other than numbers: no vector, value or list of points has its shape.
+NOT_NUMBERS = np.empty((0, 0, 0, 0, 0))
+
+
+def finite_numbers(value: Any) -> np.ndarray:
+    """Return a value as an array of floats, `NOT_NUMBERS` if it is other than numbers below 1e60."""
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        return None
-    return array if (np.abs(array) < LARGEST).all() else None
+        return NOT_NUMBERS
+    return array if (np.abs(array) < LARGEST).all() else NOT_NUMBERS
 
 
 def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -123,11 +131,10 @@ def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[i
     with user_code(f"the function given as {name}"):
         values = finite_numbers(function(points.copy()))
     wanted = (len(points), *shape)
-    if values is None or values.shape != wanted:
-        given = "something other than finite numbers" if values is None else f"shape {values.shape}"
+    if values.shape != wanted:
         raise InvalidInputError(
             f"the function given as {name} must return finite numbers of shape {wanted} for points of shape "
-            f"{points.shape}, got {given}: it receives all points at once, one row each"
+            f"{points.shape}, got {_shape(values)}: it receives all points at once, one row each"
         )
     return values
 
@@ -186,21 +193,19 @@ class SampledField:
     def __post_init__(self) -> None:
         """Convert to arrays of numbers and reject what is no field."""
         points, values = finite_numbers(self.points), finite_numbers(self.values)
-        if points is None or points.ndim != 2 or points.shape[1] not in (2, 3) or len(points) == 0:
+        if points.ndim != 2 or points.shape[1] not in (2, 3) or len(points) == 0:
             raise InvalidInputError(
-                f"SampledField.points must be rows of two or three finite numbers, got "
+                "SampledField.points must be rows of two or three finite numbers, got "
                 f"{_shape(points)}: give one row for each point"
             )
-        if values is None or values.shape not in ((len(points),), points.shape, (len(points), 6)):
+        if values.shape not in ((len(points),), points.shape, (len(points), 6)):
             raise InvalidInputError(
                 f"SampledField.values must be {len(points)} finite numbers, or rows of {points.shape[1]} or "
                 f"6, one for each point, got {_shape(values)}: give a value for each point"
             )
-        if self.reach is not None and not (np.isfinite(self.reach) and self.reach > 0):
-            raise InvalidInputError(
-                f"SampledField.reach must be a length above zero, got {self.reach!r}: give the largest "
-                "distance from a point at which its value still holds, or none"
-            )
+        if self.reach is not None:
+            remedy = "give the largest distance from a point at which its value still holds, or none"
+            check_positive("SampledField.reach", self.reach, remedy)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "values", values)
         self._refuse_doubles()
@@ -235,8 +240,7 @@ class SampledField:
             return self.points, self.values
         if dim == 3 or not flat:
             raise InvalidInputError(
-                f"SampledField.points must lie in the space of the bodies, they have {own} coordinates and "
-                f"the bodies {dim}: give {dim}"
+                f"SampledField.points must have {dim} coordinates, as the bodies have, got {own}: give {dim}"
             )
         vectors = self.values.ndim == 2 and self.values.shape[1] == 3
         return self.points[:, :2], self.values[:, :2] if vectors else self.values
@@ -268,8 +272,8 @@ def _through(known: np.ndarray, values: np.ndarray, points: np.ndarray, neighbou
     return np.asarray(form(points))
 
 
-def _shape(array: np.ndarray | None) -> str:
-    return "something other than finite numbers" if array is None else f"shape {array.shape}"
+def _shape(array: np.ndarray) -> str:
+    return "something other than finite numbers" if array is NOT_NUMBERS else f"shape {array.shape}"
 
 
 TABLES = (".csv", ".txt", ".dat", ".tsv")
@@ -351,15 +355,13 @@ def _numbers(path: Path, rows: Sequence[Sequence[str]], count: int) -> np.ndarra
     if uneven is not None or not rows:
         got = "no rows" if uneven is None else f"{len(rows[uneven])} in row {uneven + 1}"
         raise InvalidInputError(
-            f"every row of '{path}' must have {count} entries, as many as its first line names, got {got}: "
-            "complete the table"
+            f"every row of '{path}' must have {count} entries, as its first line has, got {got}: complete it"
         )
     try:
         return np.array(rows, dtype=np.float64)
     except ValueError as error:
         raise InvalidInputError(
-            f"all rows of '{path}' but the first must be numbers ({error}): write them with a point as "
-            "decimal mark"
+            f"all rows of '{path}' but the first must be numbers ({error}): write decimals with a point"
         ) from error
 
 

@@ -8,8 +8,9 @@ from typing import Literal
 import numpy as np
 
 from fenics_contact._base.checks import checked
+from fenics_contact._scene.checks import check_not_negative
 from fenics_contact._scene.fields import OfPosition
-from fenics_contact._scene.part import Around, require_surface
+from fenics_contact._scene.part import Around, require_linear, require_surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 
@@ -50,23 +51,14 @@ class FluidPressure:
         """Reject negative pressures."""
         for name in ("pressure", "critical"):
             given = getattr(self, name)
-            if given == "pressure":
-                continue
-            if not (np.isfinite(given) and given >= 0):
-                raise InvalidInputError(
-                    f"FluidPressure.{name} must be zero or positive and finite, got {given!r}: suction does "
-                    "not enter a contact"
-                )
+            if given != "pressure":
+                check_not_negative(f"FluidPressure.{name}", given, "suction does not enter a contact")
 
     def check(self, scene: Around, body: str, place: str) -> None:
         """Reject an unknown inlet, and bodies of nonlinear materials; `body`: that of the slave."""
         if isinstance(self.enters, str):
             require_surface(scene, body, self.enters, "FluidPressure.enters")
-        if scene.is_nonlinear:
-            raise InvalidInputError(
-                f"the fluid between {place} needs linear materials in all bodies: load the wetted "
-                "surfaces by Pressure where materials are nonlinear"
-            )
+        require_linear(scene, f"the fluid between {place}", "load the wetted surfaces by Pressure elsewhere")
 
     @property
     def opens_at(self) -> float:

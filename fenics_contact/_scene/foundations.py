@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from fenics_contact._base.checks import GivenVector, checked, floats
+from fenics_contact._base.checks import GivenVector, checked
+from fenics_contact._scene.checks import check_entries, checked_stiffness
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.part import Around, Part, require_surface
-from fenics_contact.errors import InvalidInputError
 
 
 @dataclass(frozen=True)
@@ -43,24 +41,20 @@ class ElasticFoundation(Part):
 
     def __post_init__(self) -> None:
         """Reject what does not hold anything, or pushes away."""
-        numbers = np.asarray(self.stiffness, dtype=np.float64)
-        if not np.isfinite(numbers).all() or (numbers < 0).any() or not numbers.any():
-            raise InvalidInputError(
-                f"ElasticFoundation.stiffness of surface {self.surface!r} of body {self.body!r} must be "
-                f"positive, or numbers of at least zero along the axes, got {self.stiffness!r}: give the "
-                "force per area that a unit of displacement causes"
-            )
-        object.__setattr__(self, "stiffness", floats(numbers) if numbers.ndim else float(numbers))
+        remedy = "give the force per area that a unit of displacement causes"
+        object.__setattr__(self, "stiffness", checked_stiffness(self._words, self.stiffness, remedy))
 
     def check(self, scene: Around) -> None:
         """Reject a vector in another space than that of the body."""
         require_surface(scene, self.body, self.surface, "ElasticFoundation")
-        dim = scene.kinematics.components
-        if isinstance(self.stiffness, tuple) and len(self.stiffness) != dim:
-            raise InvalidInputError(
-                f"ElasticFoundation.stiffness of surface {self.surface!r} of body {self.body!r} must have "
-                f"{dim} entries, got {self.stiffness!r}: give one for each axis, or a number for the normal"
-            )
+        if isinstance(self.stiffness, tuple):
+            remedy = "give one for each axis, or a number for the normal"
+            check_entries(self._words, self.stiffness, scene.kinematics.components, remedy, "entries")
+
+    @property
+    def _words(self) -> str:
+        """Its stiffness, in words."""
+        return f"ElasticFoundation.stiffness of surface {self.surface!r} of body {self.body!r}"
 
     @property
     def place(self) -> str:

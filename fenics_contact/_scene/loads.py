@@ -17,6 +17,7 @@ import numpy as np
 from fenics_contact._base.checks import GivenVector, check_row, checked, floats, naming_arguments, unit_vector
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.checks import check_entries, check_known, plain_numbers
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import (
     ScalarValue,
@@ -25,6 +26,7 @@ from fenics_contact._scene.fields import (
     checked_scalar,
     checked_vector,
     evaluate,
+    numbers_of_vector,
 )
 from fenics_contact._scene.load_part import LoadPart, SurfaceLoad
 from fenics_contact._scene.part import Around, body_of, require_nodes, require_surface, require_vector
@@ -108,12 +110,8 @@ class TotalForce(SurfaceLoad):
             given = getattr(self, name)
             if given is not None:
                 object.__setattr__(self, name, _numbers(f"TotalForce.{name}", given))
-        value = checked_vector("TotalForce.value", self.value)
-        if not isinstance(value, tuple):
-            raise InvalidInputError(
-                f"TotalForce.value must be numbers, got {self.value!r}: a resultant cannot depend "
-                "on position; give a Traction as a function of position"
-            )
+        remedy = "give one for x, y and z; what depends on position is a Traction"
+        value = numbers_of_vector("TotalForce.value", self.value, remedy)
         object.__setattr__(self, "value", value)
 
     def check(self, scene: Around) -> None:
@@ -124,21 +122,16 @@ class TotalForce(SurfaceLoad):
         _require_area(scene, self.body, self.surface)
         if not of.has_moment(self.moment, self.at):
             raise InvalidInputError(
-                f"TotalForce on {where} of a body of revolution acts along its axis, and outwards all "
-                f"around, got moment {self.moment!r} and at {self.at!r}: leave both out"
+                f"TotalForce on {where} of a body of revolution acts along its axis and outwards alone, got "
+                f"moment {self.moment!r} and at {self.at!r}: leave both out"
             )
         dim = scene.bodies[self.body].mesh.dim
         if self.moment is not None and np.shape(self.moment) != (() if dim == 2 else (3,)):
-            needed = "one number, as the body is plane" if dim == 2 else "three numbers, about x, y and z"
-            raise InvalidInputError(
-                f"TotalForce.moment on {where} must be {needed}, got {self.moment!r}: in the plane "
-                "a moment is positive from x to y"
-            )
-        if self.at is not None and len(self.at) != dim:
-            raise InvalidInputError(
-                f"TotalForce.at of the force on {where} must have {dim} coordinates, got {self.at!r}: give a "
-                "point, or none for the centroid of the surface"
-            )
+            needed = "one number, positive from x to y" if dim == 2 else "three numbers, about x, y and z"
+            raise InvalidInputError(f"TotalForce.moment on {where} must be {needed}, got {self.moment!r}")
+        if self.at is not None:
+            remedy = "give a point, or none for the centroid of the surface"
+            check_entries(f"TotalForce.at of the force on {where}", self.at, dim, remedy)
 
 
 def _require_area(scene: Around, name: str, surface: str) -> None:
@@ -146,17 +139,16 @@ def _require_area(scene: Around, name: str, surface: str) -> None:
     body = scene.bodies[name]
     if body.on_axis[body.mesh.surfaces[surface]].all():
         raise InvalidInputError(
-            f"a load on a surface needs an area, surface {surface!r} of body {name!r} is a line, the axis of "
-            "revolution: choose another surface"
+            f"a load needs an area, surface {surface!r} of body {name!r} lies on the axis of revolution: "
+            "choose another surface"
         )
 
 
 def _numbers(name: str, given: GivenVector | float) -> GivenVector | float:
     """Return finite numbers as plain ones."""
-    numbers = np.asarray(given, dtype=np.float64)
-    if not np.isfinite(numbers).all():
+    if not np.isfinite(given).all():
         raise InvalidInputError(f"{name} must be finite numbers, got {given!r}: correct it")
-    return floats(numbers) if numbers.ndim else float(numbers)
+    return plain_numbers(given)
 
 
 @dataclass(frozen=True)
@@ -342,15 +334,10 @@ class InitialStress(LoadPart):
 
     def __post_init__(self) -> None:
         """Reject a value that is neither six numbers nor a function."""
-        value = self.value
-        if isinstance(value, Ufl):
-            raise InvalidInputError(
-                f"InitialStress.value must be six numbers or a function of points, got {value!r}: UFL is for "
-                "loads that are integrated"
-            )
-        if not callable(value):
-            check_row(value, "InitialStress.value", 6)
-            object.__setattr__(self, "value", floats(np.asarray(value, dtype=np.float64)))
+        _refuse_ufl("InitialStress.value", self.value)
+        if not callable(self.value):
+            check_row(self.value, "InitialStress.value", 6)
+            object.__setattr__(self, "value", floats(np.asarray(self.value, dtype=np.float64)))
 
     def resultant(self, body: Body) -> np.ndarray:
         """Return zero."""
@@ -377,8 +364,8 @@ class InitialStress(LoadPart):
         stiff = [type(each).__name__ for each in body.materials if is_nonlinear(each)]
         if stiff:
             raise InvalidInputError(
-                f"InitialStress needs linear materials, body {self.body!r} has {stiff[0]}: take "
-                "IsotropicElasticity or another one of small strains without a history"
+                f"InitialStress needs linear materials, body {self.body!r} has {stiff[0]}: take one of small "
+                "strains without a history, such as IsotropicElasticity"
             )
         if not callable(self.value):
             self.require_components(np.array([self.value]), body)
@@ -391,9 +378,8 @@ class InitialStress(LoadPart):
         given = [word for word in without if stress[:, places[word]].any()]
         if given:
             raise InvalidInputError(
-                f"the InitialStress of body {self.body!r} must be zero in {' and '.join(without)}, which it "
-                f"does not have, got others in {' and '.join(given)}: leave them zero; the order is xx, yy, "
-                "zz, yz, xz, xy"
+                f"the InitialStress of body {self.body!r} must be zero in {' and '.join(without)}, got "
+                f"others in {' and '.join(given)}: leave them zero; the order is xx, yy, zz, yz, xz, xy"
             )
 
     def on_cells(self, mesh: BodyMesh) -> np.ndarray:
@@ -439,13 +425,8 @@ class PointForce(LoadPart):
 
     def __post_init__(self) -> None:
         """Reject a value that is not a vector."""
-        value = checked_vector("PointForce.value", self.value)
-        if isinstance(value, Ufl):
-            raise InvalidInputError(
-                f"PointForce.value must be numbers or a function of the points, got {self.value!r}: UFL is "
-                "for loads that are integrated"
-            )
-        object.__setattr__(self, "value", value)
+        _refuse_ufl("PointForce.value", self.value)
+        object.__setattr__(self, "value", checked_vector("PointForce.value", self.value))
 
     def nodes_in(self, mesh: BodyMesh) -> np.ndarray:
         """Return its nodes in the mesh of its body, ascending."""
@@ -482,13 +463,19 @@ class PointForce(LoadPart):
 Load = Traction | TotalForce | Pressure | BodyForce | ThermalStrain | InitialStress | PointForce
 
 
+def _refuse_ufl(name: str, value: object) -> None:
+    """Reject what only forms can integrate."""
+    if isinstance(value, Ufl):
+        raise InvalidInputError(
+            f"{name} must be numbers or a function of points, got {value!r}: leave UFL out"
+        )
+
+
 def require_region(load: BodyForce | InitialStress, mesh: BodyMesh) -> None:
     """Reject a region that a mesh does not have."""
-    if load.region is not None and load.region not in mesh.regions:
-        raise InvalidInputError(
-            f"{type(load).__name__} names region {load.region!r} of body {load.body!r}, whose mesh has "
-            f"{sorted(mesh.regions)}: use one of them, or none for the whole body"
-        )
+    if load.on_region:
+        words = f"{type(load).__name__} names region {load.on_region!r} of body {load.body!r}, whose mesh has"
+        check_known(load.on_region, mesh.regions, words, "use one of them, or none for the whole body")
 
 
 def initial_stress(loads: Iterable[InitialStress], body: Body) -> np.ndarray:
@@ -514,13 +501,12 @@ def gravity(body: str, density: float, acceleration: Sequence[float], region: st
         >>> weights = [gravity("beam", rho, (0, 0, -9810), part) for part, rho in
         ...            {"steel": 7.85e-9, "concrete": 2.4e-9}.items()]
     """
-    mass, direction = checked_scalar("density", density), checked_vector("acceleration", acceleration)
-    if callable(mass) or callable(direction):
+    mass, along = checked_scalar("density", density), checked_vector("acceleration", acceleration)
+    if callable(mass) or callable(along):
         raise InvalidInputError(
-            f"gravity needs numbers, got {density!r} and {acceleration!r}: give a BodyForce for what "
-            "varies with position"
+            f"gravity needs numbers, got {density!r} and {acceleration!r}: give a BodyForce that varies"
         )
-    return BodyForce(body, tuple(mass * component for component in direction), region)
+    return BodyForce(body, tuple(mass * component for component in along), region)
 
 
 @dataclass(frozen=True)
@@ -544,8 +530,8 @@ class Spinning:
         if not kinematics.has_axis(self.point, self.axis):
             needed = kinematics.axis_in_words
             raise InvalidInputError(
-                f"the axis of a centrifugal force must be that of the body, with {needed}, got point "
-                f"{self.point!r} and axis {self.axis!r}: give these"
+                f"a centrifugal force needs the axis of the body, with {needed}, got point {self.point!r} "
+                f"and axis {self.axis!r}: give these"
             )
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
@@ -614,10 +600,8 @@ def point_mass(
     Example:
         >>> motor = point_mass("frame", "seat", 0.025, (0, 0, -9810), at=(0, 0, 180))  # 25 kg, N and mm
     """
-    pulled = checked_vector("acceleration", acceleration)
-    if not np.isfinite(mass) or not isinstance(pulled, tuple):
-        raise InvalidInputError(
-            f"a point mass needs a finite mass and a vector of numbers, got {mass!r} and {acceleration!r}: "
-            "give both, in the scene's units"
-        )
+    remedy = "give that of the point mass along each axis, in the scene's units"
+    pulled = numbers_of_vector("acceleration", acceleration, remedy)
+    if not np.isfinite(mass):
+        raise InvalidInputError(f"a point mass must be finite, got {mass!r}: give it in the scene's units")
     return TotalForce(body, surface, tuple(float(mass) * component for component in pulled), at=at)

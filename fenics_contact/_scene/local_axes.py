@@ -201,9 +201,8 @@ def _hold(
         words = ", ".join(f"{part:.4g}" for part in support.directions[layer][first])
         raise InvalidInputError(
             f"supports must agree where they meet: {counted(len(clash), 'node')} of surface "
-            f"{support.surface!r} of body {body!r} would move by {amount[first]:g} along ({words}), where "
-            f"other supports prescribe {amount[first] - missing[first]:g}: give both the same displacement "
-            "there, or end one of the surfaces before the other begins"
+            f"{support.surface!r} of body {body!r} would move by {amount[first]:g} along ({words}), "
+            f"where others prescribe {amount[first] - missing[first]:g}: give both the same there, or end one"
         )
     new = np.flatnonzero(~done)
     along, missing = along[new] / size[new, None], missing[new] / size[new]

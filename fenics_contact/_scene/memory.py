@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.memory import addressable_memory, available_memory
 from fenics_contact._base.sparse import factor_bytes, prefers_explicit
+from fenics_contact._scene.checks import check_positive
 from fenics_contact.errors import InvalidInputError, together
 
 if TYPE_CHECKING:
@@ -233,11 +234,11 @@ def require_memory(
     fit, unknowns = Fit.of(scene, partitions, comm, limit=limit), _unknowns(scene)
     needed = min(fit.fast, fit.compact)
     if fit.left is not None and needed > certain * fit.left:
+        left = f"{fit.left / 1e9:.3g} GB {'are left' if limit is None else 'are allowed'}"
         raise InvalidInputError(
-            f"a state must fit into memory, but {unknowns} unknowns need about {needed / 1e9:.3g} GB on "
-            f"this machine, and {fit.left / 1e9:.3g} GB {'are left' if limit is None else 'are allowed'}: "
-            f"about {int(unknowns * fit.left / needed):,} "
-            "unknowns would fit; take coarser meshes, refine where it matters, or use more machines"
+            f"a state must fit into memory, but {unknowns} unknowns need about {needed / 1e9:.3g} GB on this "
+            f"machine, and {left}: about {int(unknowns * fit.left / needed):,} unknowns would fit; take "
+            "coarser meshes, refine where it matters, or use more machines"
         )
     return fit.is_tight
 
@@ -247,11 +248,11 @@ def _unknowns(scene: SceneParts) -> int:
 
 
 def _check_limit(limit: float | None) -> None:
-    if limit is not None and not 0.0 < limit < np.inf:
-        raise InvalidInputError(
-            f"memory must be a positive number of bytes, got {limit!r}: give what a state may take on a "
-            "machine, such as 8e9, or leave it out for what the machine has left"
+    if limit is not None:
+        remedy = (
+            "give the bytes that a state may take on a machine, such as 8e9, or none for all that are left"
         )
+        check_positive("memory", limit, remedy)
 
 
 def _factors(

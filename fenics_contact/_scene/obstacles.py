@@ -100,9 +100,8 @@ class MovingObstacle:
         fits = fits and bool(np.isfinite(shift).all())
         if not fits or not np.abs(turn @ turn.T - np.eye(dim)).max() <= 1e-9 or np.linalg.det(turn) < 0:
             raise InvalidInputError(
-                f"the path of MovingObstacle must return a rotation matrix of shape ({dim}, {dim}), or None, "
-                f"and a translation of {dim} finite numbers, got {rotation!r}, {translation!r} at time "
-                f"{time:g}: give an orthogonal matrix of determinant one"
+                f"the path of MovingObstacle must return a rotation matrix of shape ({dim}, {dim}) or None, "
+                f"and {dim} finite numbers, got {rotation!r}, {translation!r} at {time:g}: of determinant one"
             )
         return turn, shift
 
@@ -161,8 +160,8 @@ class RigidTool:
         """Reject points of another space and shapes that move."""
         if isinstance(self.shape, MovingObstacle | RigidTool):
             raise InvalidInputError(
-                f"the shape of tool {self.name!r} must not move by itself, got a "
-                f"{type(self.shape).__name__}: give its shape at rest, and its motion by a ToolMotion"
+                f"the shape of tool {self.name!r} must not move, got a {type(self.shape).__name__}: give its "
+                "shape at rest, and its motion by a ToolMotion"
             )
         dim = getattr(self.shape, "dim", len(self.at))
         if not self.name or len(self.at) != dim or dim not in (2, 3) or not np.isfinite(self.at).all():

@@ -11,12 +11,13 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import Table, in_notebooks, in_short, name_in_words, tabled
 from fenics_contact._base.late_names import warn_of_old_name
+from fenics_contact._scene.checks import check_known, check_not_negative, check_positive
 from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidTool
-from fenics_contact._scene.part import Around, Part, require_surface
+from fenics_contact._scene.part import Around, Part, require_linear, require_surface
 from fenics_contact._scene.surface_laws import (
     ClosureLaw,
     FrictionCurve,
@@ -85,20 +86,13 @@ class Coulomb:
         """Refuse negative coefficients and limits, and laws that fall."""
         _check_stiffness("Coulomb", self.stick_stiffness)
         given, limit = self.friction_coefficient, self.shear_limit
-        if not (limit is None or callable(limit) or (np.isfinite(limit) and limit > 0)):
-            raise InvalidInputError(
-                f"shear_limit must be positive and finite, got {limit!r}: give the largest friction force "
-                "per area, leave it out for none, or omit friction for a frictionless pair"
-            )
+        if not (limit is None or callable(limit)):
+            check_positive("shear_limit", limit, "give the largest friction force per area, or none")
         if isinstance(given, FrictionCurve):
             check_rising(given)
-        elif not isinstance(given, SlipTable) and not (
-            callable(given) or (np.isfinite(given) and given >= 0)
-        ):
-            raise InvalidInputError(
-                f"friction_coefficient must be zero or positive, got {given!r}: "
-                "steel on steel has about 0.3; omit friction for a frictionless pair"
-            )
+        elif not isinstance(given, SlipTable) and not callable(given):
+            remedy = "steel on steel has about 0.3; omit friction for a frictionless pair"
+            check_not_negative("friction_coefficient", given, remedy)
 
 
 @dataclass(frozen=True)
@@ -123,11 +117,9 @@ class Tresca:
     def __post_init__(self) -> None:
         """Refuse a negative bound."""
         _check_stiffness("Tresca", self.stick_stiffness)
-        if not (callable(self.traction) or (np.isfinite(self.traction) and self.traction >= 0)):
-            raise InvalidInputError(
-                f"Tresca.traction must be zero or positive, got {self.traction!r}: give the largest "
-                "tangential force per unit area that the surfaces can carry"
-            )
+        if not callable(self.traction):
+            remedy = "give the largest tangential force per unit area that the surfaces can carry"
+            check_not_negative("Tresca.traction", self.traction, remedy)
 
 
 #: A law of friction, or none.
@@ -301,9 +293,8 @@ class ContactPair(PairPart):
             )
         if self.gap is not None and self.interference is not None:
             raise InvalidInputError(
-                f"a contact pair has a gap or an interference, got gap={self.gap!r} and interference="
-                f"{self.interference!r}: keep one of them; a function that changes its sign is no gap but "
-                "two pairs"
+                f"a contact pair has a gap or an interference, got {self.gap!r} and {self.interference!r}: "
+                "keep one of them; a function that changes its sign is no gap but two pairs"
             )
         for name in ("gap", "interference", "adjust"):
             _check_length(f"ContactPair.{name}", getattr(self, name))
@@ -312,8 +303,8 @@ class ContactPair(PairPart):
         if self.nodes is not None and (self.discretisation == "mortar" or self.is_self_contact):
             given = "a body that meets itself" if self.is_self_contact else "discretisation='mortar'"
             raise InvalidInputError(
-                f"contact of the nodes of {self.nodes!r} alone is by nodes and between two bodies, got "
-                f"{given}: leave the nodes out, or give no discretisation and a master of another body"
+                f"contact of nodes {self.nodes!r} alone is by nodes and between two bodies, got {given}: "
+                "leave the nodes out, or give no discretisation and a master of another body"
             )
 
     def effects(self, scene: Around) -> tuple[EffectName, ...]:
@@ -337,11 +328,9 @@ class ContactPair(PairPart):
             self.fluid.check(scene, self.slave.body, self.place)
         if self.nodes is not None:
             self._require_touching(scene, self.nodes)
-        if self.slip_table is not None and scene.is_nonlinear:
-            raise InvalidInputError(
-                f"the SlipTable of {self.place} needs linear materials in all bodies: give the coefficient "
-                "of each load step as a number or a function of the place"
-            )
+        if self.slip_table is not None:
+            remedy = "give the coefficient of each load step as a number or a function of the place"
+            require_linear(scene, f"the SlipTable of {self.place}", remedy)
         for master in self.surfaces[1:]:
             require_surface(scene, master.body, master.name, "ContactPair.master")
         if not self.between_bodies:
@@ -354,18 +343,14 @@ class ContactPair(PairPart):
         if self.discretisation == "mortar" or self.given_gap or not deforming:
             raise InvalidInputError(
                 f"contact of body {self.slave.body!r} with itself needs a material for large deformations, "
-                "discretisation='node' and gaps as they are: change the material, such as to NeoHooke, or "
-                "split the body where its parts may touch"
+                "such as NeoHooke, discretisation='node' and gaps as they are: give these, or split the body"
             )
 
     def _require_touching(self, scene: Around, nodes: str) -> None:
         """Reject nodes that may touch without a node set of the slave's mesh, or off the slave surface."""
         mesh = scene.bodies[self.slave.body].mesh
-        if nodes not in mesh.node_sets:
-            raise InvalidInputError(
-                f"ContactPair.nodes names node set {nodes!r} of body {self.slave.body!r}, which has "
-                f"{sorted(mesh.node_sets)}: use one of them"
-            )
+        words = f"ContactPair.nodes names node set {nodes!r} of body {self.slave.body!r}, which has"
+        check_known(nodes, mesh.node_sets, words)
         away = ~np.isin(mesh.node_sets[nodes], mesh.surfaces[self.slave.name])
         if away.any():
             raise InvalidInputError(
@@ -552,8 +537,7 @@ class Tie(PairPart):
         """Reject a body that is tied to itself."""
         if self.master.body == self.slave.body:
             raise InvalidInputError(
-                f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "
-                "together, or as two bodies"
+                f"body {self.slave.body!r} cannot be tied to itself: mesh it in one piece, or as two bodies"
             )
 
     def check(self, scene: Around) -> None:
@@ -585,26 +569,21 @@ def _require_dimension(scene: Around, obstacle: RigidObstacle) -> None:
     dim = getattr(obstacle, "dim", needed)
     if dim != needed:
         raise InvalidInputError(
-            f"an obstacle must lie in the space of the bodies, {type(obstacle).__name__} is for {dim} "
-            f"dimensions and the bodies have {needed}: give it {needed} coordinates, or in the plane "
-            "a RigidSphere for a round bar"
+            f"an obstacle must lie in the space of the bodies, got a {type(obstacle).__name__} in {dim} "
+            f"dimensions: give it {needed} coordinates; in the plane a RigidSphere is a round bar"
         )
 
 
 def _check_stiffness(name: str, given: float | None) -> None:
-    if given is not None and not (np.isfinite(given) and given > 0):
-        raise InvalidInputError(
-            f"{name}.stick_stiffness must be positive and finite, got {given!r}: give the friction traction "
-            "per tangential displacement, or leave it out for points that stick without moving"
-        )
+    if given is not None:
+        remedy = "give the friction traction per tangential displacement, or none for points that do not move"
+        check_positive(f"{name}.stick_stiffness", given, remedy)
 
 
 def _check_length(name: str, value: float | OfPosition | str | None) -> None:
-    number = not (value is None or isinstance(value, str) or callable(value))
-    if number and not (np.isfinite(value) and value >= 0):  # type: ignore[arg-type, operator]
-        raise InvalidInputError(
-            f"{name} must be zero or positive and finite, got {value!r}: clearances are given by gap, "
-            "overlaps by interference, both as positive lengths"
+    if not (value is None or isinstance(value, str) or callable(value)):
+        check_not_negative(
+            name, value, "give clearances by gap, overlaps by interference, as positive lengths"
         )
 
 
@@ -647,8 +626,8 @@ def pair_number(contacts: Sequence[ContactPair], which: int | str) -> int:
         first, *others = named(which, [pair.slave.in_words for pair in contacts], places)
         if others:
             raise InvalidInputError(
-                f"one contact pair is needed, {which!r} is the slave of {1 + len(others)}: "
-                f"give {places[first]!r}, or another of {[places[k] for k in others]}, or a number from 0"
+                f"one contact pair is needed, {which!r} is the slave of {1 + len(others)}: give "
+                f"{places[first]!r}, or another of {[places[k] for k in others]}, or a number from 0"
             )
         return first
     if which not in range(len(contacts)):
@@ -669,8 +648,8 @@ def pressures_of(pairs: Iterable[ContactPair]) -> dict[str, float]:
     for fluid in (pair.fluid for pair in pairs):
         if fluid is not None and found.setdefault(fluid.name, fluid.pressure) != fluid.pressure:
             raise InvalidInputError(
-                f"the fluid {fluid.name!r} must have one pressure at all of its inlets, got "
-                f"{found[fluid.name]:g} and {fluid.pressure:g}: give different fluids different names"
+                f"fluid {fluid.name!r} must have one pressure at all inlets, got {found[fluid.name]:g} "
+                f"and {fluid.pressure:g}: give different fluids different names"
             )
     return found
 
@@ -683,11 +662,9 @@ def with_pressures(pairs: Iterable[ContactPair], given: Mapping[str, float]) -> 
     """
     pairs = tuple(pairs)
     known = pressures_of(pairs)
-    if unknown := given.keys() - known.keys():
-        raise InvalidInputError(
-            "the fluids of a load step must be some of the scene's contact pairs, which have "
-            f"{', '.join(known) or 'none'}, got {min(unknown)!r}: give a pair this fluid, or correct the name"
-        )
+    for name in sorted(given):
+        words = f"LoadStep.fluids names {name!r}, the contact pairs of the scene have"
+        check_known(name, known, words, "use one of them, or give a pair this fluid")
     return tuple(
         pair
         if pair.fluid is None or pair.fluid.name not in given

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 import numpy as np
 
+from fenics_contact._scene.checks import check_known
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._surfaces.facets import surface_moments
 from fenics_contact.errors import InvalidInputError
@@ -14,7 +15,6 @@ from fenics_contact.errors import InvalidInputError
 if TYPE_CHECKING:
     from fenics_contact._kinematics.base import Kinematics
     from fenics_contact._scene.body import Body
-    from fenics_contact.mesh.body_mesh import BodyMesh
 
 
 class Around(Protocol):
@@ -68,32 +68,27 @@ def centroid(scene: Around, body: str, surface: str) -> np.ndarray:
 
 def body_of(scene: Around, name: str, user: str) -> Body:
     """Return a body by its name."""
-    if name not in scene.bodies:
-        raise InvalidInputError(
-            f"{user} names body {name!r}, the scene has {sorted(scene.bodies)}: use one of them"
-        )
+    check_known(name, scene.bodies, f"{user} names body {name!r}, the scene has")
     return scene.bodies[name]
 
 
 def require_surface(scene: Around, body: str, surface: str, user: str) -> None:
     """Reject a surface that is not there."""
-    mesh = body_of(scene, body, user).mesh
-    if surface not in mesh.surfaces:
-        raise _unknown(mesh, body, surface, user)
+    known = body_of(scene, body, user).mesh.surfaces
+    check_known(surface, known, f"{user} names surface {surface!r} of body {body!r}, which has")
 
 
 def require_nodes(scene: Around, body: str, name: str, user: str) -> None:
     """Reject a name of neither a surface nor a node set."""
     mesh = body_of(scene, body, user).mesh
-    if name not in mesh.surfaces and name not in mesh.node_sets:
-        raise _unknown(mesh, body, name, user)
+    if name not in mesh.node_sets:
+        require_surface(scene, body, name, user)
 
 
-def _unknown(mesh: BodyMesh, body: str, surface: str, user: str) -> InvalidInputError:
-    return InvalidInputError(
-        f"{user} names surface {surface!r} of body {body!r}, which has {sorted(mesh.surfaces)}: "
-        "use one of them"
-    )
+def require_linear(scene: Around, user: str, remedy: str) -> None:
+    """Reject a scene in which some material is nonlinear."""
+    if scene.is_nonlinear:
+        raise InvalidInputError(f"{user} needs linear materials in all bodies: {remedy}")
 
 
 def require_vector(value: object, count: int, words: str, user: str, body: str) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.checks import check_alike
 from fenics_contact._scene.constraints import LinearConstraint
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import Load, Pressure
@@ -126,14 +127,8 @@ class SceneParts:
     def _require_one_dimension(self) -> None:
         """Raise if some bodies are plane and others solid, or only some are bodies of revolution."""
         require_all_or_none(self.bodies, self.deforming)
-        plane = [name for name, body in self.bodies.items() if body.mesh.dim == 2]
-        solid = [name for name in self.bodies if name not in plane]
-        if plane and solid:
-            raise InvalidInputError(
-                f"the bodies of a scene must all be plane or all be solid, got plane {plane} and solid "
-                f"{solid}: give the plane ones a thickness, as block(...) or an extruded mesh, or describe "
-                "two scenes"
-            )
+        plane = {name: body.mesh.dim == 2 for name, body in self.bodies.items()}
+        check_alike("be plane", plane, "give the plane ones a depth, as block(...), or describe two scenes")
 
     @property
     def dim(self) -> int:

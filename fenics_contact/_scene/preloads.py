@@ -7,8 +7,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
+from fenics_contact._base.checks import GivenVector, checked, unit_vector
 from fenics_contact._kinematics.measure import PLAIN, Measure
+from fenics_contact._scene.checks import check_entries, check_known, check_positive, checked_point
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.part import Around, Part, body_of
 from fenics_contact.errors import InvalidInputError
@@ -47,27 +48,15 @@ class Section:
 
     def __post_init__(self) -> None:
         """Reject a plane that is not determined, and keep its unit normal."""
-        if len(self.point) not in (2, 3) or not np.isfinite(self.point).all():
-            raise InvalidInputError(
-                f"Section.point must be three finite coordinates (two for a plane body), got {self.point!r}: "
-                "give a point inside the bolt's shank"
-            )
-        normal = unit_vector("Section.normal", self.normal, len(self.point))
-        object.__setattr__(self, "point", floats(np.asarray(self.point, dtype=np.float64)))
-        object.__setattr__(self, "normal", normal)
-        if self.radius is not None and not (np.isfinite(self.radius) and self.radius > 0):
-            raise InvalidInputError(
-                f"Section.radius must be positive, got {self.radius!r}: give the distance from the point to "
-                "which the section reaches, a little more than the radius of the bolt"
-            )
+        point = checked_point("Section.point", self.point, "give a point inside the bolt's shank")
+        object.__setattr__(self, "point", point)
+        object.__setattr__(self, "normal", unit_vector("Section.normal", self.normal, len(point)))
+        if self.radius is not None:
+            check_positive("Section.radius", self.radius, "give a little more than that of the bolt")
 
     def sides(self, mesh: BodyMesh, body: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the cells before and behind the plane that the section may separate."""
-        if len(self.point) != mesh.dim:
-            raise InvalidInputError(
-                f"the section of body {body!r} must have {mesh.dim} coordinates as the body has, got "
-                f"{self.point!r}: give {mesh.dim} of them"
-            )
+        check_entries(f"Section.point of body {body!r}", self.point, mesh.dim, "give as many coordinates")
         cells = np.arange(mesh.n_cells)
         if self.region is not None:
             cells = cells_of_region(mesh, body, self.region)
@@ -201,9 +190,6 @@ class Preload(Part):
 
 
 def cells_of_region(mesh: BodyMesh, body: str, name: str) -> np.ndarray:
-    if name not in mesh.regions:
-        raise InvalidInputError(
-            f"the section of body {body!r} names region {name!r}, its mesh has {sorted(mesh.regions)}: use "
-            "one of them, or a plane"
-        )
+    words = f"the section of body {body!r} names region {name!r}, its mesh has"
+    check_known(name, mesh.regions, words, "use one of them, or a plane")
     return mesh.regions[name]

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.checks import check_alike
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import is_nonlinear
@@ -17,20 +18,10 @@ def require_all_or_none(bodies: Mapping[str, Body], deforming: Mapping[str, Body
 
     `deforming`: those that carry no motion of a tool.
     """
-    turned = [name for name, body in bodies.items() if body.axisymmetric]
-    if turned and len(turned) < len(bodies):
-        others = [name for name in bodies if name not in turned]
-        raise InvalidInputError(
-            f"the bodies of a scene must all be bodies of revolution or none, got axisymmetric {turned} "
-            f"and others {others}: give all of them axisymmetric=True"
-        )
-    twisting = [name for name, body in bodies.items() if body.torsion]
-    if twisting and len(twisting) < len(deforming):
-        others = [name for name in deforming if name not in twisting]
-        raise InvalidInputError(
-            f"the bodies of a scene must all be able to twist or none, got torsion for {twisting} and "
-            f"not for {others}: give all of them torsion=True"
-        )
+    turned = {name: body.axisymmetric for name, body in bodies.items()}
+    check_alike("be bodies of revolution", turned, "give all of them axisymmetric=True")
+    twisting = {name: body.torsion for name, body in deforming.items()}
+    check_alike("be able to twist", twisting, "give all of them torsion=True")
 
 
 def hold_axis(body: Body, name: str, prescribed: np.ndarray) -> None:
@@ -43,8 +34,8 @@ def hold_axis(body: Body, name: str, prescribed: np.ndarray) -> None:
         moved = np.abs(np.nan_to_num(prescribed[axis, component])).max(initial=0.0)
         if moved > 0.0:
             raise InvalidInputError(
-                f"the {what} is zero on the axis of revolution, supports of body {name!r} prescribe "
-                f"up to {moved:.3g} there: leave it free or zero"
+                f"the {what} is zero on the axis of revolution, supports of body {name!r} prescribe up to "
+                f"{moved:.3g} there: leave it free or zero"
             )
         prescribed[axis, component] = 0.0
 
@@ -64,6 +55,5 @@ def require_simple_torsion(
     for needed, given in used.items():
         if given:
             raise InvalidInputError(
-                f"bodies of revolution with torsion=True need {needed}, this scene has others: leave torsion "
-                "out, or take the bodies in space"
+                f"torsion=True needs {needed}, this scene has others: leave it out, or take bodies in space"
             )

@@ -42,9 +42,7 @@ def _given(roller: Roller, points: np.ndarray) -> np.ndarray:
     size = np.linalg.norm(directions, axis=1)
     if not size.all():
         place = ", ".join(f"{x:.6g}" for x in points[int(np.argmin(size))])
-        raise InvalidInputError(
-            f"{name} must not be zero, got zeros at ({place}): leave out nodes without one"
-        )
+        raise InvalidInputError(f"{name} must not be zero, got zeros at ({place}): leave out such nodes")
     return directions / size[:, None]
 
 

@@ -216,8 +216,7 @@ class LoadStep:
             )
         if self.time is None and (callable(self.loads) or callable(self.supports)):
             raise InvalidInputError(
-                f"LoadStep {self.name!r} must have the time at its end, its loads or supports are functions "
-                "of it: give time=..."
+                f"LoadStep {self.name!r} must have the time at its end for functions of it: give time=..."
             )
 
     def applied_to(self, scene: Scene) -> Scene:

@@ -56,8 +56,7 @@ def _cut(mesh: BodyMesh, preload: Preload) -> BodyMesh:
     if len(inside):
         raise InvalidInputError(
             f"the section of a preload must leave two parts, that of {body!r} ends inside the body, at "
-            f"{counted(len(inside), 'node')}, the first near {_at(mesh, inside)}: let region or radius reach "
-            "to the surface of the bolt, or leave them out"
+            f"{counted(len(inside), 'node')} near {_at(mesh, inside)}: let region or radius reach its surface"
         )
     taken = [node for cut in mesh.cuts.values() for node in np.intersect1d(shared, cut.pairs)]
     if taken:
@@ -95,9 +94,8 @@ def changed_by(scene: SceneParts, given: Sequence[Preload]) -> tuple[Preload, ..
     unknown = aims.keys() - {preload.key for preload in scene.preloads}
     if unknown:
         raise InvalidInputError(
-            f"the preloads of a load step must have sections of the scene's, got one through body "
-            f"{min(body for body, _ in unknown)!r}: give the scene all sections, those that are tightened "
-            "later without force or shortening"
+            f"LoadStep.preloads has a section of body {min(body for body, _ in unknown)!r} that the scene "
+            "does not have: give the scene all, those that are tightened later without force or shortening"
         )
     return tuple(preload.with_aim_of(aims.get(preload.key)) for preload in scene.preloads)
 

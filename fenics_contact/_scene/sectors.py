@@ -8,8 +8,9 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
+from fenics_contact._base.checks import GivenVector, checked, unit_vector
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.checks import check_entries, checked_point
 from fenics_contact._scene.choice import NO_CHOICE, Choice
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.local_axes import HeldDirections
@@ -59,12 +60,8 @@ class CyclicSymmetry(PairPart):
 
     def __post_init__(self) -> None:
         """Reject points and axes that are not finite, and an angle that does not divide a turn."""
-        if len(self.at) not in (2, 3) or not np.isfinite(self.at).all():
-            raise InvalidInputError(
-                f"CyclicSymmetry.at must be three finite coordinates (two in the plane), got {self.at!r}: "
-                "give a point on the axis"
-            )
-        object.__setattr__(self, "at", floats(np.asarray(self.at, dtype=np.float64)))
+        at = checked_point("CyclicSymmetry.at", self.at, "give a point on the axis")
+        object.__setattr__(self, "at", at)
         if (self.axis is None) != (len(self.at) == 2):
             raise InvalidInputError(
                 f"CyclicSymmetry needs an axis in space and none in the plane, got at={self.at!r} and axis="
@@ -76,8 +73,7 @@ class CyclicSymmetry(PairPart):
             whole_sectors(self.place, self.angle)
         if self.slave == self.master:
             raise InvalidInputError(
-                f"CyclicSymmetry needs both sides of a sector, got {self.place}: name the other side as "
-                "master"
+                f"CyclicSymmetry needs both sides of a sector, got {self.place}: name the other as master"
             )
 
     def check(self, scene: Around) -> None:
@@ -85,11 +81,11 @@ class CyclicSymmetry(PairPart):
         require_surface(scene, self.slave.body, self.slave.name, "CyclicSymmetry.slave")
         require_surface(scene, self.master.body, self.master.name, "CyclicSymmetry.master")
         of = scene.kinematics
-        if len(self.at) != of.dim or not of.can_rotate:
-            raise InvalidInputError(
-                f"CyclicSymmetry.at of {self.place} must have {of.dim} coordinates, and bodies of "
-                f"revolution have no sectors, got {self.at!r}: give a point of the bodies' space"
-            )
+        check_entries(
+            f"CyclicSymmetry.at of {self.place}", self.at, of.dim, "give a point of the bodies' space"
+        )
+        if not of.can_rotate:
+            raise InvalidInputError(f"bodies of revolution have no sectors: leave out that of {self.place}")
         self.angle_in(scene)
 
     def angle_in(self, scene: Around) -> float:
@@ -129,8 +125,8 @@ class CyclicSymmetry(PairPart):
         near = [1e-6 * np.ptp(mesh.points[mesh.surfaces[name]], axis=(0, 1)).max() for mesh, name in sides]
         if np.any(np.linalg.norm(arms, axis=1) <= np.array(near)):
             raise InvalidInputError(
-                f"the angle between the sides {self.place} cannot be measured, as the middle of a side lies "
-                "on the axis: give CyclicSymmetry its angle, or sides that end at the axis"
+                f"the angle between the sides {self.place} is unknown, as the middle of one is on the axis: "
+                "give CyclicSymmetry its angle, or sides that end at the axis"
             )
         turned = np.arctan2(arms[0, 1], arms[0, 0]) - np.arctan2(arms[1, 1], arms[1, 0])
         return whole_sectors(self.place, float((turned + np.pi) % (2.0 * np.pi) - np.pi))
@@ -175,8 +171,7 @@ def whole_sectors(place: str, angle: float, off: float = 1e-2) -> float:
     if whole < 2 or abs(count - whole) > off:
         nearest = f", the nearest is {360.0 / max(whole, 2.0):.6g}°" if np.isfinite(count) else ""
         raise InvalidInputError(
-            f"the sides of a sector must be 360°/N apart, those of {place} are {np.degrees(angle):.6g}° "
-            f"apart, a part of 1/{count:.6g}{nearest}: check the surfaces, at and axis of CyclicSymmetry, or "
-            "give it the angle"
+            f"sides of a sector must be 360°/N apart, those of {place} are {np.degrees(angle):.6g}° apart, "
+            f"1/{count:.6g} of a turn{nearest}: check surfaces, at and axis of CyclicSymmetry, or give angle"
         )
     return float(np.copysign(2.0 * np.pi / whole, angle))

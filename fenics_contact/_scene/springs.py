@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.checks import checked_stiffness
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.part import Around, Part, centroid, require_nodes
@@ -62,24 +63,21 @@ class Spring(Part):
 
     def __post_init__(self) -> None:
         """Reject what holds nothing, or pushes away."""
-        numbers = np.asarray(self.stiffness, dtype=np.float64)
-        if np.isnan(numbers).any() or (numbers < 0).any() or not numbers.any():
+        name, remedy = (
+            f"Spring.stiffness of {self.label!r}",
+            "give the force that a unit of displacement causes",
+        )
+        object.__setattr__(self, "stiffness", checked_stiffness(name, self.stiffness, remedy, largest=np.inf))
+        if not np.isfinite(self.tension) or (self.tension and (self.along_axes or self.stiffness == np.inf)):
             raise InvalidInputError(
-                f"Spring.stiffness of {self.label!r} must be positive, or numbers of at least zero along the "
-                f"axes, got {self.stiffness!r}: give the force that a unit of displacement causes"
-            )
-        if not np.isfinite(self.tension) or (self.tension and (numbers.ndim or numbers == np.inf)):
-            raise InvalidInputError(
-                f"Spring.tension of {self.label!r} must be a finite number, zero with a stiffness for each "
-                f"axis or an infinite one, got {self.tension!r}: give a finite stiffness along the line "
-                "between the ends"
+                f"Spring.tension of {self.label!r} must be finite, zero with stiffness along axes or an "
+                f"infinite one, got {self.tension!r}: give a finite stiffness along its line"
             )
         if self.first == self.second:
             raise InvalidInputError(
                 f"a Spring must have two different ends, got {self.first.in_words!r} twice: give another "
                 "surface, or the coordinates of a fixed point"
             )
-        object.__setattr__(self, "stiffness", floats(numbers) if numbers.ndim else float(numbers))
         if "second" not in self.surfaces:
             object.__setattr__(self, "second", floats(np.asarray(self.second, dtype=np.float64)))
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fenics_contact._base.checks import LARGEST, GivenVector, checked, floats, unit_vector
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.checks import check_entries, checked_point
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import NodeValues, OfPosition, evaluate
 from fenics_contact._scene.local_axes import TILT, flat_normal, widest_angle
@@ -75,9 +76,8 @@ class Support(SupportPart):
         numbers = [component for component in given if not callable(component)]
         if len(self.value) not in (2, 3) or not given or not np.all(np.abs(numbers) < LARGEST):
             raise InvalidInputError(
-                "Support.value must hold three entries (two for a plane body), each a finite number, a "
-                f"function of the points or None, and at least one that is not None, got {self.value!r}: use "
-                "(0.0, 0.0, 0.0) to clamp, (None, None, 0.0) for a roller"
+                "Support.value must hold three entries (two for a plane body), numbers, functions or None, "
+                f"not all None, got {self.value!r}: (0.0, 0.0, 0.0) clamps, (None, None, 0.0) is a roller"
             )
         object.__setattr__(self, "value", tuple(self.value))
 
@@ -211,19 +211,16 @@ class Roller(SupportPart):
             raise InvalidInputError(
                 f"a roller on nodes needs a direction, node set {where} has no normal: give one"
             )
-        if given is not None and not callable(given) and len(given) != mesh.dim:
-            raise InvalidInputError(
-                f"Roller.direction of surface {where} must have {mesh.dim} components, got {given!r}: give "
-                f"{mesh.dim} of them, or none for the normal"
-            )
+        if given is not None and not callable(given):
+            remedy = f"give {mesh.dim}, or none for the normal"
+            check_entries(f"Roller.direction of surface {where}", given, mesh.dim, remedy, "components")
         if body.deforms_much and self.direction_on(mesh) is None:
+            found = "is a function"
+            if given is None:
+                found = f"turns by up to {widest_angle(mesh, self.surface):.3g} degrees, as it is curved"
             raise InvalidInputError(
-                f"a roller on a body that deforms much needs one direction, but surface {where} is curved, "
-                f"its normals turn by up to {widest_angle(mesh, self.surface):.3g} degrees: give the roller "
-                "a direction, or hold the surface by a RigidObstacle and contact"
-                if given is None
-                else f"a roller on a body that deforms much needs one direction, that of {where} is a "
-                "function: give a vector"
+                f"a Roller on a body that deforms much needs one direction, that of {where} {found}: give a "
+                "vector, or hold the surface by a RigidObstacle and contact"
             )
 
     def direction_on(self, mesh: BodyMesh) -> np.ndarray | None:
@@ -348,21 +345,16 @@ class RigidSurface(SupportPart):
 
     def __post_init__(self) -> None:
         """Reject what has not as many finite numbers as the space of the point, and loads without effect."""
-        if len(self.at) not in (2, 3) or not np.isfinite(self.at).all():
-            raise InvalidInputError(
-                f"RigidSurface.at must be three finite coordinates (two for a plane body), got {self.at!r}: "
-                "give the point whose motion is prescribed or loaded"
-            )
-        object.__setattr__(self, "at", floats(np.asarray(self.at, dtype=np.float64)))
+        remedy = "give the point whose motion is prescribed or loaded"
+        object.__setattr__(self, "at", checked_point("RigidSurface.at", self.at, remedy))
         counts = {"displacement": self.dim, "rotation": self.turns, "force": self.dim, "moment": self.turns}
         for name, count in counts.items():
             object.__setattr__(self, name, self._checked(name, count))
         idle = (self.load != 0.0) & ~self.free
         if idle.any():
             raise InvalidInputError(
-                f"a load on {self._whose} must act on free components, got "
-                f"force {self.force!r} and moment {self.moment!r} beside displacement {self.displacement!r} "
-                f"and rotation {self.rotation!r}: leave the component free (None), or the load away"
+                f"a load on {self._whose} must act on free components, got force {self.force!r} and moment "
+                f"{self.moment!r} {self._prescribes}: leave the component free (None), or the load away"
             )
 
     def effects(self, scene: Around) -> tuple[EffectName, ...]:
@@ -372,12 +364,8 @@ class RigidSurface(SupportPart):
     def check(self, scene: Around) -> None:
         """Reject nodes that are not there, and a point of another space."""
         require_nodes(scene, self.body, self.surface, "RigidSurface")
-        dim, found = scene.bodies[self.body].mesh.dim, self.in_scene(scene)
-        if found.dim != dim:
-            raise InvalidInputError(
-                f"RigidSurface.at on surface {self.surface!r} of body {self.body!r} must have {dim} "
-                f"coordinates, got {self.at!r}: give {dim} of them, and as many displacements"
-            )
+        dim, at = scene.bodies[self.body].mesh.dim, self.in_scene(scene).at
+        check_entries(f"RigidSurface.at of {self._whose}", at, dim, "give as many, and as many displacements")
 
     def in_scene(self, scene: Around) -> RigidSurface:
         """Return the rigid surface with the motions that its body can have."""
@@ -394,17 +382,11 @@ class RigidSurface(SupportPart):
             moved = (0.0, self.displacement[1] if self.displacement is not None else None)
             given = {each.name: getattr(self, each.name) for each in fields(RigidSurface)}
             return TurningSurface(**{**given, "displacement": moved})
-        if torsion:
+        if torsion or self.dim != 2 or radial or turned or self.load[0] or self.load[2]:
+            ways = "and turn about it alone" if torsion else "alone"
             raise InvalidInputError(
-                f"RigidSurface {self.surface!r} of body {self.body!r}, a body of revolution, can move along "
-                f"the axis and turn about it alone, got displacement {self.displacement!r} and force "
-                f"{self.force!r}: give displacement=(0.0, w) or force=(0.0, F), and a rotation or a moment"
-            )
-        if self.dim != 2 or radial or turned or self.load[0] or self.load[2]:
-            raise InvalidInputError(
-                f"RigidSurface {self.surface!r} of body {self.body!r}, a body of revolution, can move along "
-                f"the axis alone, got displacement {self.displacement!r}, rotation {self.rotation!r}, force "
-                f"{self.force!r} and moment {self.moment!r}: give displacement=(0.0, w) or force=(0.0, F)"
+                f"RigidSurface on {self._whose} of revolution can move along the axis {ways}, got force "
+                f"{self.force!r}, moment {self.moment!r} {self._prescribes}: give (0.0, w) or force=(0.0, F)"
             )
         along = self.displacement[1] if self.displacement is not None else None
         return replace(self, displacement=(0.0, along), rotation=0.0)
@@ -423,9 +405,8 @@ class RigidSurface(SupportPart):
             needed += ", or None for those that are free" if may_be_free and count > 1 else ""
             kind = "ToolMotion" if self.surface == TOOL else "RigidSurface"
             raise InvalidInputError(
-                f"{kind}.{name} of {self._whose} must be {needed}, as {self.at!r} "
-                f"is a point in {'the plane' if self.dim == 2 else 'space'}, got {given!r}: "
-                "give them, or nothing"
+                f"{kind}.{name} of {self._whose} must be {needed}, as its point {self.at!r} has {self.dim} "
+                f"coordinates, got {given!r}: give them, or nothing"
             )
         numbers = tuple(None if entry is None else float(entry) for entry in entries)
         return numbers[0] if count == 1 else numbers
@@ -435,6 +416,11 @@ class RigidSurface(SupportPart):
         """The surface and its body, or the tool that it moves, in words."""
         tool = self.surface == TOOL
         return f"tool {self.body!r}" if tool else f"surface {self.surface!r} of body {self.body!r}"
+
+    @property
+    def _prescribes(self) -> str:
+        """What it prescribes, in words of messages."""
+        return f"with displacement {self.displacement!r} and rotation {self.rotation!r}"
 
     @property
     def dim(self) -> int:
@@ -632,15 +618,14 @@ class ToolMotion(SupportPart):
         fits = [len(row) for row in rows] == [len(at), turns]
         if not fits or not (np.isfinite(known).all() and (known >= 0).all()):
             raise InvalidInputError(
-                f"springs of tool {self.tool!r} must have {len(at)} stiffnesses along and {turns} around the "
-                f"axes, zero or positive, got {self.stiffness!r} and {self.rotational_stiffness!r}: give "
-                "zeros where there is none"
+                f"springs of tool {self.tool!r} need {len(at)} stiffnesses along, {turns} around axes, ≥ 0, "
+                f"got {self.stiffness!r} and {self.rotational_stiffness!r}: give zeros where there is none"
             )
-        if (known[~self.of(at).free] > 0).any():
+        motion = self.of(at)
+        if (known[~motion.free] > 0).any():
             raise InvalidInputError(
-                f"springs of tool {self.tool!r} must act on free components, got {known.tolist()} beside "
-                f"displacement {self.displacement!r} and rotation {self.rotation!r}: leave the component "
-                "free (None), or the spring away"
+                f"springs of tool {self.tool!r} must act on free components, got {known.tolist()} "
+                f"{motion._prescribes}: leave the component free (None), or the spring away"
             )
         return floats(known) if known.any() else ()
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._base.checks import checked
+from fenics_contact._scene.checks import check_positive
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 
@@ -85,22 +86,13 @@ class FrictionTable(FrictionCurve):
     def __post_init__(self) -> None:
         """Reject incomplete tables, and strengths that fall."""
         p, mu = self._values
-        if not (
-            p.ndim == 1 and p.shape == mu.shape and len(p) > 1 and p[0] >= 0 and (np.diff(p) > 0).all()
-            and np.isfinite(p).all() and np.isfinite(mu).all() and (mu >= 0).all()
-        ):  # fmt: skip
-            raise InvalidInputError(
-                "FrictionTable needs two or more pressures of at least zero in ascending order, and a "
-                f"coefficient of at least zero for each, got {self.pressure!r} and {self.coefficient!r}"
-            )
+        _check_coefficients("FrictionTable", "pressures", p, mu)
         ends = mu[1:] + np.diff(mu) / np.diff(p) * p[1:]
         if (ends < 0).any():
             worst = int(np.argmin(ends))
             raise InvalidInputError(
-                "the friction traction μ(p) p of a FrictionTable must not fall with the pressure, got a "
-                f"coefficient that falls from {mu[worst]:g} to {mu[worst + 1]:g} between the pressures "
-                f"{p[worst]:g} and {p[worst + 1]:g}: spread the fall over higher pressures, or give Coulomb "
-                "a shear_limit"
+                f"μ(p) p of a FrictionTable must not fall, got μ = {mu[worst]:g} at p = {p[worst]:g} and "
+                f"{mu[worst + 1]:g} at {p[worst + 1]:g}: spread its fall, or give Coulomb a shear_limit"
             )
 
     @property
@@ -150,14 +142,7 @@ class SlipTable:
     def __post_init__(self) -> None:
         """Reject incomplete tables."""
         s, mu = (np.array(each, dtype=np.float64) for each in (self.slip, self.coefficient))
-        if not (
-            s.ndim == 1 and s.shape == mu.shape and len(s) > 1 and s[0] >= 0 and (np.diff(s) > 0).all()
-            and np.isfinite(s).all() and np.isfinite(mu).all() and (mu >= 0).all()
-        ):  # fmt: skip
-            raise InvalidInputError(
-                "SlipTable needs two or more slips of at least zero in ascending order, and a coefficient of "
-                f"at least zero for each, got {self.slip!r} and {self.coefficient!r}"
-            )
+        _check_coefficients("SlipTable", "slips", s, mu)
 
     def at(self, slip: np.ndarray) -> np.ndarray:
         """Return the coefficients at slips, shape (n,).
@@ -177,6 +162,28 @@ class SlipTable:
         return np.asarray(np.pad(slopes, 1)[np.searchsorted(self.slip, slip, side="right")])
 
 
+def _check_coefficients(name: str, what: str, of: np.ndarray, mu: np.ndarray) -> None:
+    """Reject a table of friction coefficients whose numbers do not fit each other."""
+    if not (
+        of.ndim == 1 and of.shape == mu.shape and len(of) > 1 and of[0] >= 0 and (np.diff(of) > 0).all()
+        and np.isfinite(of).all() and np.isfinite(mu).all() and (mu >= 0).all()
+    ):  # fmt: skip
+        raise InvalidInputError(
+            f"{name} needs two or more {what} of at least zero in ascending order, and a coefficient of at "
+            f"least zero for each, got {of.tolist()} and {mu.tolist()}"
+        )
+
+
+def _check_finite(name: str, p: np.ndarray, values: Sequence[np.ndarray]) -> None:
+    """Reject functions that do not return a finite number for each pressure."""
+    if any(each.shape != p.shape or not np.isfinite(each).all() for each in values):
+        shapes = " and ".join(str(each.shape) for each in values)
+        raise InvalidInputError(
+            f"{name} must return a finite number for each pressure, shape {p.shape}, got shapes {shapes}: "
+            "check them at zero, low and high pressures"
+        )
+
+
 def check_rising(curve: FrictionCurve, decades: int = 12) -> None:
     """Reject a curve that falls, or starts above zero; pressures of ``decades`` above and below one."""
     p = np.concatenate([[0.0], np.logspace(-decades, decades, 40 * decades + 1)])
@@ -184,20 +191,14 @@ def check_rising(curve: FrictionCurve, decades: int = 12) -> None:
     with user_code(f"{name} as a law of friction"):
         values = [np.asarray(each(p), dtype=np.float64) for each in (curve.strength, curve.growth)]
         largest = float(curve.largest_coefficient)
-    if any(each.shape != p.shape or not np.isfinite(each).all() for each in values):
-        shapes = ", ".join(str(each.shape) for each in values)
-        raise InvalidInputError(
-            f"strength and growth of {name} must return a finite number for each pressure, shape {p.shape}, "
-            f"got shapes {shapes}: check them at zero and at high pressures"
-        )
+    _check_finite(f"strength and growth of {name}", p, values)
     strength, growth = values
     wrong = np.flatnonzero((np.diff(strength) < -1e-12 * strength[1:]) | (growth[1:] < 0))
     if strength[0] != 0.0 or len(wrong):
         at = p[wrong[0] + 1] if len(wrong) else 0.0
         raise InvalidInputError(
             f"the friction traction of {name} must be zero without pressure and must not fall, got "
-            f"{np.interp(at, p, strength):g} at the pressure {at:g}: a friction force that falls with the "
-            "normal force has no unique answer; give it a constant value from there on"
+            f"{np.interp(at, p, strength):g} at the pressure {at:g}: keep it there for a unique answer"
         )
     if (strength > largest * p * (1.0 + 1e-9)).any():
         raise InvalidInputError(
@@ -287,11 +288,8 @@ class LinearClosure(ClosureLaw):
 
     def __post_init__(self) -> None:
         """Reject a stiffness that is not positive."""
-        if not (np.isfinite(self.stiffness) and self.stiffness > 0):
-            raise InvalidInputError(
-                f"LinearClosure.stiffness must be positive and finite, got {self.stiffness!r}: give the "
-                "pressure per closure, or omit the closure for exact contact"
-            )
+        remedy = "give the pressure per closure, or omit the closure for exact contact"
+        check_positive("LinearClosure.stiffness", self.stiffness, remedy)
 
     def closure(self, pressure: np.ndarray) -> np.ndarray:
         """Return p / stiffness, see `ClosureLaw.closure`."""
@@ -328,11 +326,8 @@ class ExponentialClosure(ClosureLaw):
 
     def __post_init__(self) -> None:
         """Reject numbers that are not positive."""
-        if not all(np.isfinite(each) and each > 0 for each in (self.pressure, self.clearance)):
-            raise InvalidInputError(
-                "ExponentialClosure needs a positive pressure at distance zero and a positive clearance, got "
-                f"{self.pressure!r} and {self.clearance!r}"
-            )
+        check_positive("ExponentialClosure.pressure", self.pressure, "give that at distance zero")
+        check_positive("ExponentialClosure.clearance", self.clearance, "give the distance at which it begins")
 
     @property
     def reach(self) -> float:  # type: ignore[override]
@@ -391,9 +386,8 @@ class ClosureTable(ClosureLaw):
         if len(wrong) or c[-1] == c[-2]:
             at = int(wrong[0]) if len(wrong) else len(c) - 2
             raise InvalidInputError(
-                "pressures of a ClosureTable must rise with the closures, got "
-                f"{p[at]:g} at {c[at]:g} and {p[at + 1]:g} at {c[at + 1]:g}: surfaces whose pressure falls "
-                "as they approach have no unique answer; leave out the falling part, or give it a small slope"
+                f"pressures of a ClosureTable must rise for a unique answer, got {p[at]:g} at {c[at]:g} and "
+                f"{p[at + 1]:g} at {c[at + 1]:g}: leave out the falling part, or give it a small slope"
             )
 
     @property
@@ -439,16 +433,11 @@ def check_closing(law: ClosureLaw, decades: int = 12) -> None:
     p, name = np.logspace(-decades, decades, 40 * decades + 1), type(law).__name__
     with user_code(f"{name} as a law of closure"):
         closure, growth = (np.asarray(each(p), dtype=np.float64) for each in (law.closure, law.growth))
-    if any(each.shape != p.shape or not np.isfinite(each).all() for each in (closure, growth)):
-        raise InvalidInputError(
-            f"closure and growth of {name} must return a finite number for each pressure, shape {p.shape}, "
-            f"got shapes {closure.shape} and {growth.shape}: check them at low and high pressures"
-        )
+    _check_finite(f"closure and growth of {name}", p, (closure, growth))
     wrong = np.flatnonzero((np.diff(closure) < -1e-12 * np.abs(closure[1:])) | (growth[1:] < 0))
     if closure[0] < 0.0 or len(wrong) or not np.isfinite(law.reach):
         at = int(wrong[0]) + 1 if len(wrong) else 0
         raise InvalidInputError(
             f"the closure of {name} must be zero without pressure and must not fall, got {closure[at]:g} at "
-            f"the pressure {p[at]:g}: surfaces that open under pressure have no unique answer; count "
-            "closures from `reach`, and give a falling part a small slope"
+            f"the pressure {p[at]:g}: count from `reach`; a part with a small slope has a unique answer"
         )

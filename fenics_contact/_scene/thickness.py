@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.checks import check_alike
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import BodyForce, InitialStress, Load
 from fenics_contact._scene.pairs import ContactPair
@@ -25,14 +26,10 @@ def require_thickness(
 
     `bodies`: those of a scene that carry no motion of a tool.
     """
-    without = [name for name, body in bodies.items() if not body.has_thickness]
-    if len(without) == len(bodies):
+    thick = {name: body.has_thickness for name, body in bodies.items()}
+    check_alike("have a thickness", thick, "give it to the materials of all of them")
+    if not any(thick.values()):
         return
-    if without:
-        raise InvalidInputError(
-            f"the bodies of a scene must all have a thickness or none, {without} have none: give it to their "
-            "materials, too"
-        )
     if foundations:
         raise InvalidInputError(
             "an ElasticFoundation of plane bodies needs materials without a thickness, as its stiffness is "

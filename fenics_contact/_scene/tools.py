@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from fenics_contact._base.checks import GivenVector, checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body, Modes
+from fenics_contact._scene.checks import check_known
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair
@@ -116,8 +117,7 @@ def tools_of(contacts: Sequence[ContactPair]) -> dict[str, tuple[RigidTool, str]
         known = found.setdefault(tool.name, (tool, pair.slave.body))[0]
         if known != tool:
             raise InvalidInputError(
-                f"two different tools have the name {tool.name!r}: give each tool a name of its own, or the "
-                "same tool to both pairs"
+                f"two different tools have the name {tool.name!r}: rename one, or give both pairs one tool"
             )
     return found
 
@@ -142,8 +142,8 @@ def bodies_with_tools(bodies: Mapping[str, Body], contacts: Sequence[ContactPair
         elif slave in own:  # a wrong name is an error of its own
             if tool.dim != own[slave].mesh.dim:
                 raise InvalidInputError(
-                    f"a tool must lie in the space of the bodies, {name!r} lies in {tool.dim} dimensions and "
-                    f"body {slave!r} in {own[slave].mesh.dim}: give it {own[slave].mesh.dim} coordinates"
+                    f"tool {name!r} must lie in the space of body {slave!r}, got {tool.dim} dimensions: give "
+                    f"{own[slave].mesh.dim} coordinates"
                 )
             turned = own[slave].axisymmetric
             if turned:
@@ -164,11 +164,8 @@ def with_motions(
         if not isinstance(support, ToolMotion):
             made.append(support)
             continue
-        if support.tool not in tools:
-            raise InvalidInputError(
-                f"a ToolMotion names tool {support.tool!r}, the contact pairs of the scene have "
-                f"{sorted(tools)}: use one of them"
-            )
+        words = f"a ToolMotion names tool {support.tool!r}, the contact pairs of the scene have"
+        check_known(support.tool, tools, words)
         body = tools[support.tool]
         if support.tool in changed:
             raise InvalidInputError(

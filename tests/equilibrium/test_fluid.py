@@ -226,9 +226,11 @@ def test_bad_fluids_are_refused() -> None:
         FluidPressure(-1.0, "x0")
     with pytest.raises(InvalidInputError, match=r"FluidPressure.pressure must be zero or positive"):
         LoadStep("leak", fluids={"fluid": -1.0}).applied_to(seal(FluidPressure(1.0, "x0")))
-    with pytest.raises(InvalidInputError, match=r"contact pairs, which have fluid, got 'oil': give a pair"):
+    with pytest.raises(
+        InvalidInputError, match=r"names 'oil', the contact pairs of the scene have \['fluid'\]: use"
+    ):
         LoadStep("leak", fluids={"oil": 1.0}).applied_to(seal(FluidPressure(1.0, "x0")))
-    with pytest.raises(InvalidInputError, match=r"which have none, got 'fluid'"):
+    with pytest.raises(InvalidInputError, match=r"names 'fluid', the contact pairs of the scene have none"):
         LoadStep("leak", fluids={"fluid": 1.0}).applied_to(seal(None))
     two = seal(FluidPressure(1.0, "x0"))
     other = replace(two.contacts[0], master=SPHERE, fluid=FluidPressure(2.0, "x0"))

@@ -82,7 +82,7 @@ def test_bounds_of_scaled_multipliers_are_scaled() -> None:
 def test_laws_that_fall_are_refused() -> None:
     with pytest.raises(
         InvalidInputError,
-        match=r"must not fall .* falls from 0.4 to 0.1 between the pressures 1 and 2: spread",
+        match=r"of a FrictionTable must not fall, got μ = 0.4 at p = 1 and 0.1 at 2: spread",
     ):
         FrictionTable((0.0, 1.0, 2.0), (0.4, 0.4, 0.1))
     with pytest.raises(InvalidInputError, match="two or more pressures of at least zero in ascending order"):

@@ -122,7 +122,7 @@ def test_what_is_no_set_of_nodes_or_force_on_one_is_refused() -> None:
     with pytest.raises(InvalidInputError, match=r"node set 'a' must number nodes 0 to 35, got 99 to 99"):
         replace(BAR, node_sets={"a": [99]})
     with pytest.raises(
-        InvalidInputError, match=r"PointForce.value must be numbers or a function of the points"
+        InvalidInputError, match=r"PointForce.value must be numbers or a function of points, got"
     ):
         PointForce("bar", "end", Ufl(lambda x: x))
 

@@ -104,5 +104,5 @@ def test_bodies_of_several_shapes_are_integrated_in_full(shape: str, nodes: list
     mesh = serendipity(quadratic(BodyMesh(points, joined_cells(given, dim))))
     law = STEEL if dim == 3 else PlaneStrain(1e3, 0.3)
     assert Body(mesh, law).integration == "full"
-    with pytest.raises(InvalidInputError, match=rf"8 nodes alone, got 1 .*{shape} and 1 .*leave it out"):
+    with pytest.raises(InvalidInputError, match=rf"8 nodes alone, .* got 1 .*{shape} and 1 .*leave it out"):
         Body(mesh, law, integration="reduced")

@@ -289,7 +289,7 @@ def test_preloads_that_say_nothing_definite_are_refused(made, message):
 def test_load_steps_and_results_name_preloads_of_the_scene():
     scene = clamped(Preload("bar", MIDDLE, force=1.0))
     other = Preload("bar", Section((0, 0, 3), (0, 0, 1)), force=1.0)
-    with pytest.raises(InvalidInputError, match="of the scene's, got one through body 'bar'"):
+    with pytest.raises(InvalidInputError, match="has a section of body 'bar' that the scene does not have"):
         LoadStep("more", preloads=[other]).applied_to(scene)
     with pytest.raises(InvalidInputError, match="was cut at a section that no Preload holds together"):
         Scene(scene.bodies, scene.supports)

@@ -312,7 +312,7 @@ def test_a_body_that_only_its_own_rigid_surface_holds_is_not_held() -> None:
         ({"moment": (0.0, 0.0, 1.0)}, "must act on free components"),
         (
             {"moment": 1.0},
-            "RigidSurface.moment .* must be 3 finite numbers, as .* is a point in space, got 1.0",
+            "RigidSurface.moment .* must be 3 finite numbers, as its point .* has 3 coordinates, got 1.0",
         ),
         ({"displacement": "far"}, "RigidSurface.displacement must be .* got 'far'"),
     ],
@@ -325,7 +325,7 @@ def test_what_is_no_motion_is_refused(given: dict[str, Any], words: str) -> None
 
 def test_a_point_must_lie_in_the_space_of_the_body() -> None:
     with pytest.raises(
-        InvalidInputError, match=r"RigidSurface.at on surface 'x1' .* must have 3 coordinates, got"
+        InvalidInputError, match=r"RigidSurface.at of surface 'x1' .* must have 3 coordinates, got"
     ):
         bar([RigidSurface("bar", "x1", (0.0, 0.0))])
     with pytest.raises(InvalidInputError, match="RigidSurface names surface 'top' of body 'bar', which has"):

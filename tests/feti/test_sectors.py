@@ -282,14 +282,14 @@ def test_sides_that_are_no_sector_are_refused_with_the_angle_found() -> None:
     mesh = ring(BORE, RIM, 100, 3, part=0.07)
     bodies = {"ring": Body(mesh, STEEL)}
     sides = Surface("ring", "end"), Surface("ring", "start")
-    message = r"must be 360°/N apart, .* on ring start are 25\.2° apart, .* 1/14\.2857, the nearest is 25\.7"
+    message = r"360°/N apart, .* ring start are 25\.2° apart, 1/14\.2857 of a turn, the nearest is 25\.7"
     with pytest.raises(InvalidInputError, match=message):
         Scene(bodies, ties=[CyclicSymmetry(*sides, (0.0, 0.0))])
     given = CyclicSymmetry(*sides, (0.0, 0.0), angle=np.pi / 7)
     message = r"the same surface once the master is turned, but with the angle 25\.7143° .* up to 0\.\d* off"
     with pytest.raises(InvalidInputError, match=message):
         solved(Scene(bodies, [Support("ring", "inner")], [Traction("ring", "outer", around)], ties=[given]))
-    with pytest.raises(InvalidInputError, match="the middle of a side lies on the axis"):
+    with pytest.raises(InvalidInputError, match="the middle of one is on the axis"):
         Scene(bodies, ties=[CyclicSymmetry(*sides, (0.5 * (BORE + RIM), 0.0))])
     with pytest.raises(InvalidInputError, match="360°/N apart"):
         CyclicSymmetry(*sides, (0.0, 0.0), angle=1.0)

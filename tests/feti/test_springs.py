@@ -280,7 +280,7 @@ def test_a_body_that_a_spring_lets_turn_is_refused() -> None:
         (lambda: Spring(FIRST, SECOND, (1.0, -1.0, 0.0)), "must be positive, or numbers of at least zero"),
         (
             lambda: Spring(FIRST, SECOND, (1.0, 1.0, 0.0), 3.0),
-            "must be a finite number, zero with a stiffness",
+            "must be finite, zero with stiffness along axes",
         ),
         (lambda: Spring(FIRST, FIRST, 1.0), "must have two different ends"),
         (

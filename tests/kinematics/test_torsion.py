@@ -523,8 +523,11 @@ def fit() -> Scene:
     [
         (lambda: small(axisymmetric=False), "needs a body of revolution"),
         (lambda: Scene({"a": small(), "b": small(torsion=False)}), "able to twist or none"),
-        (lambda: Scene({"a": replace(small(), material=NeoHooke(1.0, 0.3))}), "need linear materials"),
-        (lambda: Scene({"a": small()}, [Roller("a", "x1")]), "need no rollers"),
+        (
+            lambda: Scene({"a": replace(small(), material=NeoHooke(1.0, 0.3))}),
+            "torsion=True needs linear materials",
+        ),
+        (lambda: Scene({"a": small()}, [Roller("a", "x1")]), "needs no rollers"),
         (
             lambda: Scene(
                 {"a": small()},
@@ -532,15 +535,15 @@ def fit() -> Scene:
                     ContactPair(Surface("a", "y0"), RigidTool("pad", RigidPlane((0, 0), (0, 1)), (0, 0)))
                 ],
             ),
-            "need no rigid tools",
+            "needs no rigid tools",
         ),
         (
             lambda: Scene({"a": small()}, preloads=[Preload("a", Section((1.5, 0.5), (0, 1)), 10.0)]),
-            "need no preloads",
+            "needs no preloads",
         ),
         (
             lambda: Scene({"a": small()}, springs=[Spring(Surface("a", "y0"), (1.5, -1.0), (0.0, 1.0))]),
-            "need no springs",
+            "needs no springs",
         ),
         (
             lambda: Scene({"a": small()}, [Support("a", "y0", (None, 0.0))]),

@@ -146,7 +146,7 @@ def test_what_it_cannot_be_is_refused() -> None:
     mesh, flat = box("hexahedron"), box("quadrilateral")
     with pytest.raises(InvalidInputError, match=r"InitialStress.value must be 6 finite numbers"):
         InitialStress("body", (1.0, 2.0, 3.0))
-    with pytest.raises(InvalidInputError, match=r"must be six numbers or a function of points, got .*Ufl"):
+    with pytest.raises(InvalidInputError, match=r"must be numbers or a function of points, got .*Ufl"):
         InitialStress("body", Ufl(lambda x: x))
     with pytest.raises(InvalidInputError, match=r"names region 'top' of body 'body'"):
         Scene({"body": Body(mesh, steel(3))}, loads=[InitialStress("body", tuple(GIVEN), "top")])
@@ -154,7 +154,7 @@ def test_what_it_cannot_be_is_refused() -> None:
     with pytest.raises(InvalidInputError, match=r"needs linear materials, body 'body' has J2Plasticity"):
         Scene({"body": metal}, loads=[InitialStress("body", tuple(GIVEN))])
     plate = Body(flat, PlaneStress(100.0, 0.3))
-    with pytest.raises(InvalidInputError, match=r"must be zero in yz and xz and zz, .* got others in zz"):
+    with pytest.raises(InvalidInputError, match=r"must be zero in yz and xz and zz, got others in zz"):
         Scene({"body": plate}, loads=[InitialStress("body", tuple(in_plane(GIVEN)))])
-    with pytest.raises(InvalidInputError, match=r"must be zero in yz and xz, .* got others in yz and xz"):
+    with pytest.raises(InvalidInputError, match=r"must be zero in yz and xz, got others in yz and xz"):
         solved(Body(flat, steel(2)), InitialStress("body", lambda x: np.tile(GIVEN, (len(x), 1))))

@@ -96,7 +96,7 @@ def test_scene_files_spin_bodies_and_fasten_masses() -> None:
     [
         (lambda: centrifugal("disc", DENSITY, np.inf), "needs finite numbers and the coordinates of a point"),
         (lambda: centrifugal("disc", 1.0, SPEED, axis=(0, 0, 0)), "must be 3 finite numbers, not all zero"),
-        (lambda: point_mass("disc", "y0", np.nan, (0, -1)), "needs a finite mass and a vector of numbers"),
+        (lambda: point_mass("disc", "y0", np.nan, (0, -1)), "a point mass must be finite, got nan"),
     ],
 )
 def test_what_is_no_motion_or_mass_is_refused(made, message) -> None:
@@ -107,6 +107,6 @@ def test_what_is_no_motion_or_mass_is_refused(made, message) -> None:
 @pytest.mark.parametrize("given", [((0.0, 0.0),), ((0, 0, 0), (0, 0, 1)), ((1.0, 0.0), (0.0, 1.0))])
 def test_bodies_of_revolution_turn_about_their_own_axis(given) -> None:
     body = Body(rectangle((0, 0), (1, 1), (1, 1)), IsotropicElasticity(1.0, 0.3), axisymmetric=True)
-    message = r"must be that of the body, with point \(0, 0\) and axis \(0, 1\)"
+    message = r"needs the axis of the body, with point \(0, 0\) and axis \(0, 1\)"
     with pytest.raises(InvalidInputError, match=message):
         Scene({"disc": body}, loads=[centrifugal("disc", 1.0, 1.0, *given)])

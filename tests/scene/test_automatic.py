@@ -167,7 +167,9 @@ def test_bodies_that_may_fold_are_their_own_masters() -> None:
     assert [each.place for each in both.contacts] == [
         "seal near plate on plate near seal", "seal boundary on seal boundary",
     ]  # fmt: skip
-    with pytest.raises(InvalidInputError, match=r"needs names of bodies of the scene, seal, got 'sael'"):
+    with pytest.raises(
+        InvalidInputError, match=r"self_contact names body 'sael', the scene has \['seal'\]: use"
+    ):
         Scene(rubber, contacts=AutomaticContact(self_contact=("sael",)))
     named = {"seal": Body(found.bodies["seal"].mesh, NeoHooke(10.0, 0.3))}
     with pytest.raises(InvalidInputError, match="must have no surface 'boundary' yet"):

@@ -96,8 +96,8 @@ def test_no_value_is_invented_far_from_the_points() -> None:
         ([[0, 0, 0]], [1.0, 2.0], None, "values must be 1 finite numbers, or rows of 3"),
         ([[0, 0, 0], [1, 0, 0]], [[1.0, 2.0], [1.0, 2.0]], None, "values must be 2 finite numbers"),
         ([[0, 0, 0], [1, 0, 0], [0, 0, 0]], [1.0, 2.0, 3.0], None, "points 0 and 2 are the same"),
-        ([[0, 0, 0]], [1.0], 0.0, "reach must be a length above zero"),
-        ([[0, 0, 0]], [1.0], np.inf, "reach must be a length above zero"),
+        ([[0, 0, 0]], [1.0], 0.0, "reach must be positive and finite"),
+        ([[0, 0, 0]], [1.0], np.inf, "reach must be positive and finite"),
     ],
 )
 def test_what_is_no_field_is_refused(points: Any, values: Any, reach: Any, message: str) -> None:
@@ -106,9 +106,9 @@ def test_what_is_no_field_is_refused(points: Any, values: Any, reach: Any, messa
 
 
 def test_points_in_space_do_not_suit_plane_bodies() -> None:
-    with pytest.raises(InvalidInputError, match="they have 3 coordinates and the bodies 2"):
+    with pytest.raises(InvalidInputError, match="must have 2 coordinates, as the bodies have, got 3"):
         SampledField(np.eye(3), np.zeros(3))(np.zeros((1, 2)))
-    with pytest.raises(InvalidInputError, match="they have 2 coordinates and the bodies 3"):
+    with pytest.raises(InvalidInputError, match="must have 3 coordinates, as the bodies have, got 2"):
         SampledField(np.eye(2), np.zeros(2))(np.zeros((1, 3)))
 
 
@@ -194,10 +194,10 @@ def pair(**given: Any) -> ContactPair:
     [
         (
             {"gap": 0.1, "interference": 0.1},
-            r"a gap or an interference, got gap=0\.1 and interference=",
+            r"a gap or an interference, got 0\.1 and 0\.1: keep",
         ),
         ({"gap": 0.0, "interference": "measured"}, "a gap or an interference"),
-        ({"gap": -0.1}, r"ContactPair\.gap must be zero or positive and finite, got -0\.1: clearances are"),
+        ({"gap": -0.1}, r"ContactPair\.gap must be zero or positive and finite, got -0\.1: give clearances"),
         ({"interference": -0.1}, r"ContactPair\.interference must be zero or positive"),
         ({"adjust": -0.1}, r"ContactPair\.adjust must be zero or positive"),
         ({"gap": np.nan}, r"ContactPair\.gap must be zero or positive and finite, got nan"),

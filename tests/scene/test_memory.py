@@ -111,7 +111,7 @@ def test_subdomains_are_stored_compactly_where_a_state_would_not_fit_otherwise()
     expected, found = (adjoint.multiplier for adjoint in adjoints)
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
     for without_sense in (0.0, np.nan, np.inf):
-        with pytest.raises(InvalidInputError, match="memory must be a positive number of bytes, got"):
+        with pytest.raises(InvalidInputError, match="memory must be positive and finite, got"):
             solve_scene(scene, MPI.COMM_SELF, partitions=parts, memory=without_sense)
 
 

@@ -211,16 +211,16 @@ def test_a_level_set_function_that_is_no_distance_is_refused(
 @pytest.mark.parametrize(
     ("obstacle", "given"),
     [
-        (RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), "RigidPlane is for 3"),
-        (RigidSphere((0.0, -1.0, 0.0), 1.0), "RigidSphere is for 3"),
-        (RigidCylinder((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), 1.0), "RigidCylinder is for 3"),
+        (RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), "RigidPlane in 3"),
+        (RigidSphere((0.0, -1.0, 0.0), 1.0), "RigidSphere in 3"),
+        (RigidCylinder((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), 1.0), "RigidCylinder in 3"),
     ],
 )
 def test_an_obstacle_in_space_is_refused_below_a_plane_body(obstacle: RigidObstacle, given: str) -> None:
     body = Body(rectangle((0.0, 0.0), (1.0, 1.0), (1, 1)), PlaneStrain(1.0, 0.3))
     message = (
-        f"an obstacle must lie in the space of the bodies, {given} dimensions and the bodies have 2: give it "
-        "2 coordinates, or in the plane a RigidSphere for a round bar"
+        f"an obstacle must lie in the space of the bodies, got a {given} dimensions: give it 2 "
+        "coordinates; in the plane a RigidSphere is a round bar"
     )
     with pytest.raises(InvalidInputError, match=message):
         Scene({"block": body}, contacts=[ContactPair(Surface("block", "y0"), obstacle)])

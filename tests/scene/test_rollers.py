@@ -298,7 +298,7 @@ def test_rollers_and_supports_must_agree_where_they_meet() -> None:
     with pytest.raises(InvalidInputError, match=message):
         solved(Scene(body, [Support("b", "z0"), Roller("b", "x0", 0.5)]))
     twice = [Roller("b", "x0"), Roller("b", "x0", 0.1), Support("b", "x1")]
-    with pytest.raises(InvalidInputError, match="where other supports prescribe 0"):
+    with pytest.raises(InvalidInputError, match="where others prescribe 0"):
         solved(Scene(body, twice))
 
 
@@ -316,7 +316,7 @@ def test_directions_and_displacements_of_rollers_are_checked() -> None:
 
 def test_a_curved_roller_is_refused_where_bodies_deform_much() -> None:
     bodies = {"ring": Body(ring(BORE, RIM, 24, 2, part=0.25), NeoHooke(10.0, 0.3))}
-    message = "needs one direction, but surface 'outer' .* turn by up to 37.5 degrees: give the roller"
+    message = "needs one direction, that of 'outer' .* turns by up to 37.5 degrees, as it is curved: give a"
     with pytest.raises(InvalidInputError, match=message):
         Scene(bodies, [Roller("ring", "outer")])
     Scene(bodies, [Roller("ring", "outer", direction=(1.0, 1.0)), Roller("ring", "start")])

@@ -111,8 +111,8 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         'master = { body = "lower", surface = "z1" }',
         'master = { body = "upper", surface = "z1" }',
         "scene.toml, line 37: contacts.0: contact of body 'upper' with itself needs a material for large "
-        "deformations, discretisation='node' and gaps as they are: change the material, such as to NeoHooke, "
-        "or split the body where its parts may touch",
+        "deformations, such as NeoHooke, discretisation='node' and gaps as they are: give these, or split "
+        "the body",
     ),
     "a tolerance is no tolerance": (
         "tolerance = 1e-8",

@@ -81,7 +81,7 @@ def test_a_sector_is_that_of_the_package() -> None:
     for wrong, words in (
         ({"kind": "round"}, "ties.0.kind must be one of 'cyclic', got "),
         ({"axis": [0, 0, 0]}, "CyclicSymmetry.axis must be 3 finite numbers"),
-        ({"angle": 1.0}, "the sides of a sector must be 360°/N apart"),
+        ({"angle": 1.0}, "sides of a sector must be 360°/N apart"),
     ):
         with pytest.raises(SceneFileError, match=words):
             _ = file_with_block(meshes={"m": square}, ties=[{**given, **wrong}]).scene
