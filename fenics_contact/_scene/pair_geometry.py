@@ -288,7 +288,7 @@ class _Meeting:
 def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     """Return between which surfaces the gaps of a pair are measured."""
     geometry = "best" if pair.geometry == "faceted" else pair.geometry
-    slave = surface_of(scene, pair.slave, geometry if pair.nodes is None else "faceted")
+    slave = surface_of(scene, pair.slave, "faceted" if pair.single_nodes else geometry)
     name = _name(scene, pair, pair.slave, slave)
     if not pair.between_bodies:
         met = _meeting_obstacle(slave, pair.obstacle)
@@ -328,9 +328,9 @@ def _wider(slave: FacetedSurface, master: FacetedSurface, met: _Meeting) -> floa
 def _name(scene: SceneParts, pair: ContactPair, surface: Surface, faceted: FacetedSurface) -> str:
     if pair.geometry == "faceted":
         return "facets"
-    shape = scene.bodies[surface.body].mesh.origin.shapes.get(surface.name)
-    if pair.geometry == "best" and shape is not None:
-        return _shape_name(shape)
+    shapes = scene.bodies[surface.body].mesh.origin.shapes
+    if pair.geometry == "best" and surface.name in shapes:
+        return _shape_name(shapes[surface.name])
     return "flat" if faceted.relief is None else "reconstructed"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from itertools import chain
 from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
@@ -54,6 +55,12 @@ class Surface:
         return f"{self.body} {self.name}"
 
 
+def _check_stiffness(name: str, given: float | None) -> None:
+    if given is not None:
+        remedy = "give the friction traction per tangential displacement, or none for points that do not move"
+        check_positive(f"{name}.stick_stiffness", given, remedy)
+
+
 @dataclass(frozen=True)
 @checked()
 class Coulomb:
@@ -85,14 +92,38 @@ class Coulomb:
     def __post_init__(self) -> None:
         """Refuse negative coefficients and limits, and laws that fall."""
         _check_stiffness("Coulomb", self.stick_stiffness)
-        given, limit = self.friction_coefficient, self.shear_limit
+        limit = self.shear_limit
         if not (limit is None or callable(limit)):
             check_positive("shear_limit", limit, "give the largest friction force per area, or none")
-        if isinstance(given, FrictionCurve):
-            check_rising(given)
-        elif not isinstance(given, SlipTable) and not callable(given):
+        for curve in self.curves:
+            check_rising(curve)
+        if not callable(self.value):
             remedy = "steel on steel has about 0.3; omit friction for a frictionless pair"
-            check_not_negative("friction_coefficient", given, remedy)
+            check_not_negative("friction_coefficient", self.value, remedy)
+
+    @property
+    def curves(self) -> tuple[FrictionCurve, ...]:
+        """How friction follows the pressure, if it is not proportional to it."""
+        given = self.friction_coefficient
+        return (given,) if isinstance(given, FrictionCurve) else ()
+
+    @property
+    def tables(self) -> tuple[SlipTable, ...]:
+        """How the coefficient follows the slip, if it does."""
+        given = self.friction_coefficient
+        return (given,) if isinstance(given, SlipTable) else ()
+
+    @property
+    def value(self) -> Any:
+        """The coefficient, the largest of any pressure and slip."""
+        largest = [curve.largest_coefficient for curve in self.curves]
+        largest += [max(table.coefficient) for table in self.tables]
+        return next(iter(largest), self.friction_coefficient)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The coefficient, if it is one number."""
+        return () if self.curves or self.tables or callable(self.value) else (self.value,)
 
 
 @dataclass(frozen=True)
@@ -111,6 +142,10 @@ class Tresca:
     """
 
     effect = EffectName.TRESCA
+    #: Neither follows the pressure or the slip, nor has a coefficient.
+    curves = tables = numbers = ()
+    #: The traction is one.
+    shear_limit = None
     traction: float | OfPosition
     stick_stiffness: float | None = None
 
@@ -121,9 +156,15 @@ class Tresca:
             remedy = "give the largest tangential force per unit area that the surfaces can carry"
             check_not_negative("Tresca.traction", self.traction, remedy)
 
+    @property
+    def value(self) -> Any:
+        """The traction."""
+        return self.traction
+
 
 #: A law of friction, or none.
 Friction: TypeAlias = Coulomb | Tresca | None
+FRICTIONLESS = Coulomb(0.0)
 
 
 class PairPart(Chosen, Part):
@@ -291,13 +332,15 @@ class ContactPair(PairPart):
                 f"ContactPair.master must be a Surface or an obstacle, got the class {self.master.__name__}: "
                 "write it with where it lies, such as RigidPlane((0, 0, 0), (0, 0, 1))"
             )
-        if self.gap is not None and self.interference is not None:
+        if {"gap", "interference"} <= self._given_gaps.keys():
             raise InvalidInputError(
                 f"a contact pair has a gap or an interference, got {self.gap!r} and {self.interference!r}: "
                 "keep one of them; a function that changes its sign is no gap but two pairs"
             )
-        for name in ("gap", "interference", "adjust"):
-            _check_length(f"ContactPair.{name}", getattr(self, name))
+        for name, value in self._given_gaps.items():
+            if value != "measured" and not callable(value):
+                remedy = "give clearances by gap, overlaps by interference, as positive lengths"
+                check_not_negative(f"ContactPair.{name}", value, remedy)
         if self.closure is not None:
             check_closing(self.closure)
         if self.nodes is not None and (self.discretisation == "mortar" or self.is_self_contact):
@@ -309,14 +352,14 @@ class ContactPair(PairPart):
 
     def effects(self, scene: Around) -> tuple[EffectName, ...]:
         """Return contact, and what its laws call for."""
-        curved = self.friction_curve, self.slip_table, self.shear_limit
+        law = self._law
         laws = {
             EffectName.CLOSURE: self.closure is not None,
-            EffectName.FLUID: self.fluid is not None,
-            EffectName.FRICTION_CURVE: any(each is not None for each in curved),
+            EffectName.FLUID: bool(self.fluids),
+            EffectName.FRICTION_CURVE: bool(law.curves or law.tables) or law.shear_limit is not None,
         }
-        if self.friction is not None and self.has_friction:
-            laws |= {self.friction.effect: True, EffectName.STICK_STIFFNESS: self.stick_stiffness is not None}
+        if self.has_friction:
+            laws |= {law.effect: True, EffectName.STICK_STIFFNESS: self.stick_stiffness is not None}
         return self.effect, *(name for name, given in laws.items() if given)
 
     def check(self, scene: Around) -> None:
@@ -324,11 +367,11 @@ class ContactPair(PairPart):
         require_surface(scene, self.slave.body, self.slave.name, "ContactPair.slave")
         if self.is_self_contact:
             self._require_deforming(scene)
-        if self.fluid is not None:
-            self.fluid.check(scene, self.slave.body, self.place)
+        for fluid in self.fluids:
+            fluid.check(scene, self.slave.body, self.place)
         if self.nodes is not None:
             self._require_touching(scene, self.nodes)
-        if self.slip_table is not None:
+        if self._law.tables:
             remedy = "give the coefficient of each load step as a number or a function of the place"
             require_linear(scene, f"the SlipTable of {self.place}", remedy)
         for master in self.surfaces[1:]:
@@ -402,9 +445,20 @@ class ContactPair(PairPart):
     @property
     def depends_on_slave(self) -> bool:
         """Whether something is given of the slave's points, so that the other side cannot take its place."""
-        measured = self.gap is None and self.adjust is None and self.interference in (None, "measured")
+        measured = all(value == "measured" for value in self._given_gaps.values())
         varies = self.friction_varies or callable(self.shear_limit)
-        return varies or not measured or self.nodes is not None or self.fluid is not None
+        return varies or not measured or bool(self.single_nodes or self.fluids)
+
+    @property
+    def fluids(self) -> tuple[FluidPressure, ...]:
+        """The fluid that enters, if one does."""
+        return () if self.fluid is None else (self.fluid,)
+
+    @property
+    def _given_gaps(self) -> dict[str, Any]:
+        """What is given of gaps, by the names of the fields."""
+        given = {"gap": self.gap, "interference": self.interference, "adjust": self.adjust}
+        return {name: value for name, value in given.items() if value is not None}
 
     @property
     def master_in_words(self) -> str:
@@ -416,9 +470,9 @@ class ContactPair(PairPart):
     @property
     def given_gap(self) -> str:
         """What the pair gives in place of measured gaps, in words; empty if nothing."""
-        words = {"gap": self.gap, "interference": self.interference, "in touch within": self.adjust}
-        given = [(name, value) for name, value in words.items() if value is not None]
-        return ", ".join(f"{name} {_in_words(value)}" for name, value in given)
+        words = {"adjust": "in touch within"}
+        given = self._given_gaps.items()
+        return ", ".join(f"{words.get(name, name)} {_in_words(value)}" for name, value in given)
 
     def gap_at(self, points: np.ndarray) -> np.ndarray | None:
         """Return the gap or, as a negative number, the interference that the pair gives; None if none.
@@ -432,17 +486,18 @@ class ContactPair(PairPart):
         Raises:
             InvalidInputError: If a function returns anything but lengths of zero or more.
         """
-        if self.gap is not None:
-            return _not_negative(f"gap of {self.place}", self.gap, points)
-        if self.interference is None or isinstance(self.interference, str):
+        given = self._given_gaps
+        if "gap" in given:
+            return _not_negative(f"gap of {self.place}", given["gap"], points)
+        if given.get("interference", "measured") == "measured":
             return None
-        return -_not_negative(f"interference of {self.place}", self.interference, points)
+        return -_not_negative(f"interference of {self.place}", given["interference"], points)
 
     @property
     def gives_all_gaps(self) -> bool:
         """Whether no gap of the pair is measured."""
-        value = self.interference if self.gap is None else self.gap
-        return self.adjust is None and value not in (None, "measured")
+        given = self._given_gaps
+        return "adjust" not in given and any(value != "measured" for value in given.values())
 
     @property
     def has_friction(self) -> bool:
@@ -455,41 +510,34 @@ class ContactPair(PairPart):
         return callable(self.friction_value)
 
     @property
-    def _coefficient(self) -> object:
-        """Coulomb's friction coefficient, zero without one."""
-        return self.friction.friction_coefficient if isinstance(self.friction, Coulomb) else 0.0
+    def _law(self) -> Coulomb | Tresca:
+        """The law of friction, without one that of a coefficient of zero."""
+        return self.friction or FRICTIONLESS
 
     @property
     def friction_curve(self) -> FrictionCurve | None:
         """How friction follows the pressure where it is not proportional to it."""
-        return self._coefficient if isinstance(self._coefficient, FrictionCurve) else None
+        return next(iter(self._law.curves), None)
 
     @property
     def slip_table(self) -> SlipTable | None:
         """How the friction coefficient follows the slip; None where it does not."""
-        return self._coefficient if isinstance(self._coefficient, SlipTable) else None
+        return next(iter(self._law.tables), None)
 
     @property
     def shear_limit(self) -> float | OfPosition | None:
         """Largest friction traction, whatever the pressure; None if there is none."""
-        return self.friction.shear_limit if isinstance(self.friction, Coulomb) else None
+        return self._law.shear_limit
 
     @property
     def stick_stiffness(self) -> float | None:
         """Friction traction per elastic slip; None where points that stick do not move."""
-        return None if self.friction is None else self.friction.stick_stiffness
+        return self._law.stick_stiffness
 
     @property
     def friction_value(self) -> Any:
         """Friction coefficient, the largest of any pressure, or Tresca's traction; zero without friction."""
-        match self.friction:
-            case Coulomb(friction_coefficient=FrictionCurve() as curve):
-                return curve.largest_coefficient
-            case Coulomb(friction_coefficient=SlipTable(coefficient=values)):
-                return max(values)
-            case Coulomb(friction_coefficient=value) | Tresca(traction=value):
-                return value
-        return 0.0
+        return self._law.value
 
     def friction_at(self, points: np.ndarray) -> np.ndarray:
         """Return the friction coefficient, or Tresca's traction, at points of the slave, shape (n,).
@@ -574,19 +622,6 @@ def _require_dimension(scene: Around, obstacle: RigidObstacle) -> None:
         )
 
 
-def _check_stiffness(name: str, given: float | None) -> None:
-    if given is not None:
-        remedy = "give the friction traction per tangential displacement, or none for points that do not move"
-        check_positive(f"{name}.stick_stiffness", given, remedy)
-
-
-def _check_length(name: str, value: float | OfPosition | str | None) -> None:
-    if not (value is None or isinstance(value, str) or callable(value)):
-        check_not_negative(
-            name, value, "give clearances by gap, overlaps by interference, as positive lengths"
-        )
-
-
 def _not_negative(name: str, given: float | OfPosition, points: np.ndarray) -> np.ndarray:
     """Return a number or the values of a function at points, shape (n,), if none is negative."""
     if not callable(given):
@@ -604,7 +639,7 @@ def _not_negative(name: str, given: float | OfPosition, points: np.ndarray) -> n
 def _in_words(value: float | OfPosition | str) -> str:
     if callable(value):
         return "by a function"
-    return value if isinstance(value, str) else f"{value:g}"
+    return "measured" if value == "measured" else f"{value:g}"
 
 
 def named(which: str, surfaces: Sequence[str], places: Sequence[str]) -> list[int]:
@@ -645,8 +680,8 @@ def pressures_of(pairs: Iterable[ContactPair]) -> dict[str, float]:
         InvalidInputError: If a fluid has two.
     """
     found: dict[str, float] = {}
-    for fluid in (pair.fluid for pair in pairs):
-        if fluid is not None and found.setdefault(fluid.name, fluid.pressure) != fluid.pressure:
+    for fluid in chain.from_iterable(pair.fluids for pair in pairs):
+        if found.setdefault(fluid.name, fluid.pressure) != fluid.pressure:
             raise InvalidInputError(
                 f"fluid {fluid.name!r} must have one pressure at all inlets, got {found[fluid.name]:g} "
                 f"and {fluid.pressure:g}: give different fluids different names"
@@ -666,8 +701,7 @@ def with_pressures(pairs: Iterable[ContactPair], given: Mapping[str, float]) -> 
         words = f"LoadStep.fluids names {name!r}, the contact pairs of the scene have"
         check_known(name, known, words, "use one of them, or give a pair this fluid")
     return tuple(
-        pair
-        if pair.fluid is None or pair.fluid.name not in given
-        else replace(pair, fluid=replace(pair.fluid, pressure=given[pair.fluid.name]))
+        replace(pair, fluid=replace(*changed, pressure=given[changed[0].name])) if changed else pair
         for pair in pairs
+        for changed in ([fluid for fluid in pair.fluids if fluid.name in given],)
     )

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fenics_contact._scene.pairs import Coulomb
 from fenics_contact._scene.scene import Scene
 from fenics_contact.materials.elastic import isotropic_constants
 
@@ -38,8 +37,7 @@ def odd_values(scene: Scene) -> Iterator[str]:
             if words := odd_modulus(young, size):
                 yield f"odd units in body {name!r}? {words}; in N/mm² it would be {1e-6 * young:g}"
     for pair in scene.contacts:
-        if isinstance(pair.friction, Coulomb) and isinstance(pair.friction.friction_coefficient, int | float):
-            given = pair.friction.friction_coefficient
+        for given in pair.friction.numbers if pair.friction else ():
             if given > LARGEST_FRICTION:
                 yield (
                     f"odd friction in {pair.place}? a coefficient of {given:g} is larger than that of any "
