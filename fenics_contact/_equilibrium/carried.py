@@ -75,8 +75,7 @@ class TransferredState:
         ]
         if what:
             raise InvalidInputError(
-                f"load steps on other meshes need histories that are carried there, that of {what[0]} is "
-                "not: keep the meshes, or refine them before the first step"
+                f"load steps on other meshes carry histories, but not that of {what[0]}: keep the meshes"
             )
 
     def scene_on(self, scene: Scene) -> Scene:

@@ -209,8 +209,7 @@ class DeformedEquilibria:
         materials = [each for body in scene.bodies.values() for each in body.materials]
         if time < earlier and any(has_history(each) for each in materials):
             raise InvalidInputError(
-                f"the time of load steps must not decrease where materials have a history, got {time:g} "
-                f"after {earlier:g}: give later times, or none"
+                f"with material histories time must not decrease, got {time:g} after {earlier:g}: give later"
             )
 
     def _on_meshes_of(
@@ -248,14 +247,14 @@ class DeformedEquilibria:
         places = [{(each.body, each.surface) for each in at.rigid_surfaces} for at in (before.scene, scene)]
         if new := sorted(places[1] - places[0]):
             raise InvalidInputError(
-                f"a RigidSurface must be there from the first step on, that on surface {new[0][1]!r} of body "
-                f"{new[0][0]!r} is new: give it in the steps before, too, with all components free"
+                "a RigidSurface must be there from the first step on, that on "
+                f"{new[0][1]!r} of {new[0][0]!r} is new: give it before, with all components free"
             )
         pairs = [[(pair.slave, pair.master) for pair in each.contacts] for each in (before.scene, scene)]
         if scene.deforms_much and any(one != other for one, other in zip(*pairs, strict=False)):
             raise InvalidInputError(
-                "with large deformations the pairs that a load step leaves out must be the last ones of the "
-                f"scene, got {len(pairs[1])} of {len(pairs[0])}: give the scene's pairs in another order"
+                f"with large deformations steps may leave out the last pairs alone, got {len(pairs[1])} of "
+                f"{len(pairs[0])}: give the scene's pairs in another order"
             )
         at = before.equilibrium.configuration
         acted = self._loading(
@@ -329,8 +328,7 @@ def _as_accurate_as(wanted: Wanted, steps: AutomaticSteps) -> AutomaticSteps:
     tolerance = steps.newton.tolerance if wanted.tolerance is None else wanted.tolerance
     if not isinstance(tolerance, float):
         raise InvalidInputError(
-            f"the tolerance of nonlinear materials must be a number, got {tolerance!r}: their errors are not "
-            "estimated; leave it out for 1e-8"
+            f"tolerances of nonlinear materials must be numbers, got {tolerance!r}: leave it out for 1e-8"
         )
     return replace(steps, newton=replace(steps.newton, tolerance=tolerance))
 
@@ -396,8 +394,8 @@ def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
     alone = unresisted_motions(torn, ()) if torn.scene.foundations else ()
     if alone:
         raise InfeasibleError(
-            f"elastic foundations alone hold body {alone[0]}, but Newton's method needs supports, ties or "
-            "contacts beside them: support it there, or cut the body into fewer subdomains"
+            f"Newton's method needs supports, ties or contacts beside elastic foundations, which alone hold "
+            f"body {alone[0]}: support it there, or cut the body into fewer subdomains"
         ) from failure
 
 
@@ -405,8 +403,7 @@ def _require_elastic(scene: Scene) -> None:
     """Reject rigid tools on bodies that are nonlinear with small displacements."""
     if not scene.deforms_much and scene.tools:
         raise InvalidInputError(
-            "a RigidTool needs linear materials or those for large deformations, got materials that are "
-            "nonlinear with small displacements: give a body a material for large deformations"
+            "a RigidTool needs linear materials or large deformations, got small ones that are nonlinear"
         )
 
 

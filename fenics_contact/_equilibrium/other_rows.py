@@ -59,8 +59,7 @@ def require_values_to_keep(step: LoadStep, scene: Scene) -> None:
     """Reject supports that are functions of time and keep what nodes have: they are asked on the way, too."""
     if callable(step.supports) and any(support.keeps for support in scene.supports):
         raise InvalidInputError(
-            f"supports of LoadStep {step.name!r} that are functions of time must have values, "
-            "got HoldCurrent: give those that keep what they have in a list, supports=[...]"
+            f"supports of LoadStep {step.name!r} as functions of time cannot HoldCurrent: give them in a list"
         )
 
 

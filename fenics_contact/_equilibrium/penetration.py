@@ -88,8 +88,7 @@ class FluidFront:
         """Reject motions that are found: they move with the front."""
         if torn.free.count:
             raise InvalidInputError(
-                "derivatives by the shape with fluid that enters a contact need rigid tools and surfaces "
-                "and preloads whose motion is known: prescribe it, or load the wetted surfaces by Pressure"
+                "derivatives by the shape need known motions where fluid enters a contact: prescribe them"
             )
 
     def pass_tolerance(self, wanted: float) -> float:

@@ -288,8 +288,7 @@ class ContactProblem:
     def _require_no_dual_solver(self) -> None:
         if self.solver is not None:
             raise InvalidInputError(
-                f"dual solvers are for linear materials, this scene has others, got {self.solver!r}: "
-                "give steps=AutomaticSteps(TangentNewton(...)) instead"
+                f"dual solvers are for linear materials, got {self.solver!r}: give steps=AutomaticSteps(...)"
             )
 
     def _deformed(self, scene: Scene) -> DeformedEquilibria:
@@ -386,6 +385,6 @@ def _require_obstacles_at(scene: Scene, time: float) -> None:
     for pair in scene.contacts:
         if not all(each.is_where_it_was(time) for each in pair.moving):
             raise InvalidInputError(
-                f"with small displacements obstacles must not move, but that of {pair.place} has moved by "
-                f"time {time:g}: move the bodies against it, or give one a material for large deformations"
+                f"obstacles move with large deformations alone, that of {pair.place} has by time {time:g}: "
+                "move the bodies against it, or give one a material for large deformations"
             )

@@ -42,8 +42,7 @@ class FrictionBySlip:
         """Reject later load steps, whose slip begins at a state that depends on the shape, too."""
         if before is not None:
             raise InvalidInputError(
-                "derivatives by the shape with friction by slip need a single load step: give the "
-                "coefficient as a number, a function of the place or a FrictionTable"
+                "derivatives with friction by slip need one load step: give a number or a FrictionTable"
             )
 
     def pass_tolerance(self, wanted: float) -> float:

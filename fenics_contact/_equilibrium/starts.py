@@ -51,8 +51,7 @@ def checked_start(scene: Scene, start: State | None, refinements: Mapping[str, R
     cells = [[body.mesh.cells.shape for body in each.bodies.values()] for each in (start.scene, scene)]
     if cells[0] != cells[1]:
         raise InvalidInputError(
-            f"start must be a state on the meshes of the scene, of {cells[1]} cells and nodes, got "
-            f"{cells[0]}: where they are refined give refinements=, else start=None"
+            f"start must have {cells[1]} (cells, nodes), got {cells[0]}: give refinements= or start=None"
         )
     return SameMeshes(start)
 

@@ -282,8 +282,7 @@ class _Balance:
         ).solve()
         if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
             raise ConvergenceError(
-                "the check whether every body is held needs an answer, the conic solver ended with "
-                f"{solution.status}: check the scale of loads and lengths"
+                f"the check whether bodies are held ended with {solution.status}: check the scale of lengths"
             )
         if solution.x[size] <= LEFT:
             return None

@@ -317,14 +317,12 @@ def _problem_of(given: ContactProblem | Scene, comm: MPI.Comm | None) -> Contact
     if not isinstance(given, Scene):
         if comm not in (None, given.comm):
             raise InvalidInputError(
-                "solve_steps of a ContactProblem is on the problem's own communicator, got another one: "
-                "leave it out, or give the scene"
+                "solve_steps of a ContactProblem is on its own communicator, got another: leave it out"
             )
         return given
     if comm is None or not hasattr(comm, "allreduce"):
         raise InvalidInputError(
-            f"solve_steps of a scene needs a communicator, got {kind_in_words(type(comm))}: "
-            "solve_steps(scene, steps, MPI.COMM_WORLD)"
+            f"solve_steps of a scene needs a communicator, got {kind_in_words(type(comm))}: MPI.COMM_WORLD"
         )
     return ContactProblem(given, comm)
 

@@ -25,8 +25,8 @@ def require_rows(torn: TornSystem, stored: Stored) -> None:
     """Reject a stored state with other rows."""
     if stored["multiplier"].shape != (torn.numbering.total,):
         raise InvalidInputError(
-            f"a stored state needs {torn.numbering.total} multipliers, got "
-            f"{stored['multiplier'].size}: give the scene and the partition of that state"
+            f"a stored state needs {torn.numbering.total} multipliers, got {stored['multiplier'].size}: "
+            "give the scene and the partition of that state"
         )
 
 

@@ -377,8 +377,7 @@ def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:
     work, size = system.problem.comm.allreduce(np.stack([work, size]))
     if np.any(np.abs(work) > MOTION_ROUNDING * size):
         raise ConvergenceError(
-            "the adjoint needs an objective that no free motion changes, this one changes along a rigid "
-            "motion that meets no resistance (`State.unheld`): add a support, or take another"
+            "objectives must not change along free motions (`State.unheld`), this one does: add a support"
         )
 
 
@@ -395,8 +394,7 @@ def require_from_rest(state: State) -> None:
     """Check that friction of a state does not depend on other states."""
     if state.contact.slip_before[state.torn.frictional].any():
         raise InvalidInputError(
-            "a state alone can be differentiated if it is a single load step from rest, got one with slip of "
-            "earlier steps, which depends on the design, too: use LoadPath"
+            "a state differentiated alone must be one step from rest, got slip of earlier steps: use LoadPath"
         )
 
 

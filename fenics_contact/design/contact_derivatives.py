@@ -246,9 +246,8 @@ def _require_own_rows(torn: TornSystem, points: ContactPoints) -> None:
     diagonal = np.asarray(points.master[np.arange(points.count), points.slave]).ravel()
     if np.any(np.abs(diagonal) > HELD) and torn.groups.of(ConstraintRows):
         raise InvalidInputError(
-            "derivatives by the shape need surfaces that end at periodic edges to meet alike at both, got "
-            f"{np.count_nonzero(np.abs(diagonal) > HELD)} points that are means over different facets: give "
-            "both surfaces the same cells, or discretisation='node'"
+            "derivatives by the shape need surfaces that meet alike at both periodic edges, got means over "
+            "different facets: give both surfaces the same cells, or discretisation='node'"
         )
 
 

@@ -84,8 +84,7 @@ class SurfaceDesign:
         """Reject a net without points or with more points than the surface has nodes."""
         if min(self.counts) < 1:
             raise InvalidInputError(
-                f"a net needs at least one control point each way, got {self.net}: try (7, 4), for a curve "
-                "in the plane 7"
+                f"a net needs control points each way, got {self.net}: try (7, 4), for a curve in the plane 7"
             )
         if isinstance(self.surface, str):
             return  # its nodes are counted once it is `on` a scene
@@ -96,8 +95,7 @@ class SurfaceDesign:
             )
         if any(points > most for points, most in zip(self.counts, nodes, strict=True)):
             raise InvalidInputError(
-                f"a net of {self.net} control points needs at least as many nodes each way, the surface has "
-                f"{nodes}: use fewer control points or a finer mesh"
+                f"a net {self.net} needs as many nodes each way, got {nodes}: use fewer points or finer cells"
             )
 
     def on(self, scene: Scene) -> SurfaceDesign:
@@ -124,9 +122,8 @@ class SurfaceDesign:
         if lost.size:
             names = ", ".join(map(str, np.flatnonzero(np.abs(lost).max(axis=0) > 0.1)))
             raise InvalidInputError(
-                f"the surface mesh of {self.body!r} is too coarse for a net {self.net}: its {self.size} "
-                f"control points move the nodes in only {self.size - len(lost)} independent ways (variables "
-                f"{names} depend on one another): use fewer control points or a finer mesh"
+                f"the surface mesh of {self.body!r} is too coarse for a net {self.net}, nodes move only in "
+                f"{self.size - len(lost)} ways (variables {names} depend on one another): use fewer points"
             )
 
     def _within(self, surface: DesignSurface, scene: Scene) -> DesignSurface:
@@ -138,8 +135,8 @@ class SurfaceDesign:
         leaving = int(np.count_nonzero(length <= LAST_PLACES))
         if leaving:
             raise InvalidInputError(
-                f"a design surface may end at a plane of symmetry, but {counted(leaving, 'node')} of that on "
-                f"{self.body!r} would leave it: choose another surface"
+                f"design surfaces may end at planes of symmetry, {counted(leaving, 'node')} of that on "
+                f"{self.body!r} would leave one: choose another surface"
             )
         directions = surface.directions.copy()
         directions[at] = inside / length[:, None]
@@ -154,8 +151,7 @@ class SurfaceDesign:
         """
         if isinstance(self.surface, str):
             raise InvalidInputError(
-                f"the nodes of surface {self.surface!r}, given by name, are not known yet: take the design "
-                "from ShapeProblem.designs, or put it on a scene with design.on(scene)"
+                f"surface {self.surface!r}, given by name, needs a scene for its nodes: take design.on(scene)"
             )
         return self.surface
 
@@ -278,8 +274,8 @@ class MovedSurface:
         """Check the variables and the nodes' parameters."""
         if np.shape(self.alpha) != (self.design.size,):
             raise InvalidInputError(
-                f"the variables of the design on {self.design.body!r} must have shape ({self.design.size},), "
-                f"got {np.shape(self.alpha)}: give its part of alpha"
+                f"alpha of the design on {self.design.body!r} must have shape ({self.design.size},), got "
+                f"{np.shape(self.alpha)}: give its part"
             )
         counts = self.design.lattice.counts
         grid = tensor_grid(self.ticks)

@@ -223,7 +223,6 @@ def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
     found = [load for load in torn.scene.loads if moves(load)]
     if any(each.is_function for load in found for each in load.at_points):
         raise InvalidInputError(
-            "derivatives by the shape need forces at nodes as numbers, got a function of the points: give a "
-            "PointForce for each value"
+            "derivatives by the shape need forces at nodes as numbers, got a function: give each a PointForce"
         )
     return found

@@ -309,8 +309,7 @@ class AdaptiveTolerance:
         """Reject empty ranges."""
         if not 0.0 < self.tightest <= self.loosest < 1.0:
             raise InvalidInputError(
-                f"tolerances need 0 < tightest <= loosest < 1, got {self.tightest:g} and {self.loosest:g}: "
-                "try AdaptiveTolerance(loosest=1e-3, tightest=1e-9)"
+                f"tolerances need 0 < tightest <= loosest < 1, got {self.tightest:g} and {self.loosest:g}"
             )
 
     def first(self, value: float, subgradient: float, error_by_tolerance: float) -> float:

@@ -156,8 +156,7 @@ class MeshMotion:
         if both:
             nodes = counted(both, f"node of body {name!r} lies", f"nodes of body {name!r} lie")
             raise InvalidInputError(
-                f"the design surface must keep away from supports, but {nodes} on both: "
-                "choose another surface"
+                f"the design surface must keep away from supports, but {nodes} on both: choose another"
             )
         self.moving, self.held = moving, held
         mesh = body_mesh(decomposition, name, body)
@@ -298,13 +297,12 @@ class DesignGeometry:
             )
             if body.mesh.has_several_shapes:
                 raise InvalidInputError(
-                    f"designs need bodies with one shape of cells, body {name!r} has "
-                    f"{body.mesh.cells_in_words}: mesh it with one, for instance with tetrahedra alone"
+                    f"designs need bodies with one shape of cells, {name!r} has {body.mesh.cells_in_words}"
                 )
         if scene.sectors:
             raise InvalidInputError(
-                f"designs have no derivatives of cyclic symmetry, the scene ties {scene.sectors[0].place}: "
-                "model the whole, or a sector between planes of symmetry by Roller"
+                f"designs need scenes without cyclic symmetry, got {scene.sectors[0].place}: model all, or a "
+                "sector between planes of symmetry by Roller"
             )
         self.designs = tuple(design.on(scene) for design in designs)
         self.size = sum(design.size for design in self.designs)

@@ -38,8 +38,7 @@ class MeanNear(Weighable, ABC):
         """Check the radius."""
         if not 0.0 < self.radius < np.inf:
             raise InvalidInputError(
-                f"{type(self).__name__}.radius must be a positive length, got {self.radius!r}: give that of "
-                "the region over which the mean is taken, two or more cells"
+                f"{type(self).__name__}.radius must be a positive length, got {self.radius!r}: give two cells"
             )
 
     @abstractmethod
@@ -71,8 +70,7 @@ class MeanNear(Weighable, ABC):
         require_body(state, name, self.body)
         if place.shape != (state.scene.dim,):
             raise InvalidInputError(
-                f"{name}.at must have {state.scene.dim} coordinates in this scene, got {self.at!r}: give a "
-                "place in the body"
+                f"{name}.at must be a place of {state.scene.dim} coordinates in the body, got {self.at!r}"
             )
         density, further = self._density(state)
         integral = BodyIntegral(state, forms, density, self.body)
@@ -80,8 +78,8 @@ class MeanNear(Weighable, ABC):
         weight = integral(*numbers, 0.0, 1.0)
         if weight <= 0.0:
             raise InvalidInputError(
-                f"{name} needs cells of body {self.body!r} within its radius, but there are none within "
-                f"{self.radius:g} of {tuple(map(float, place))}: give a place in the body, or a larger radius"
+                f"{name} needs cells of body {self.body!r} within {self.radius:g} of its place, got none at "
+                f"{tuple(map(float, place))}: give a place in the body, or a larger radius"
             )
         return integral(*numbers, 1.0, 0.0) / weight, weight, integral, numbers
 

@@ -94,8 +94,7 @@ def require_linear(state: State, objective: Objective) -> None:
     """Reject an objective that knows linear materials alone."""
     if state.scene.is_nonlinear:
         raise InvalidInputError(
-            f"{type(objective).__name__} needs linear materials, this state has others: take contact forces "
-            "or pressures, Movement, or an objective of your own"
+            f"{type(objective).__name__} needs linear materials, got others: take contact forces or Movement"
         )
 
 
@@ -185,14 +184,9 @@ class WeightedSum(Weighable):
         for weight, objective in self.terms:
             if not isinstance(weight, int | float | np.number) or not np.isfinite(weight):
                 raise InvalidInputError(
-                    f"an objective can be multiplied by a finite number, got {weight!r}: give its weight, "
-                    "such as 2.0 * objective"
+                    f"an objective's weight must be a finite number, got {weight!r}: write 2.0 * objective"
                 )
-            if not callable(getattr(objective, "partials", None)):
-                raise InvalidInputError(
-                    f"an objective can be added to another one, got {type(objective).__name__}: add an "
-                    "object with value and partials, such as TotalPotential()"
-                )
+            _require_objective(objective, "WeightedSum")
 
     @property
     def energies(self) -> tuple[float, float]:  # type: ignore[override]
@@ -237,6 +231,14 @@ def can_be_infinite(objective: Objective) -> bool:
     return bool(getattr(objective, "can_be_infinite", True))
 
 
+def _require_objective(given: object, user: str) -> None:
+    """Reject a part of a compound objective that is none."""
+    if not callable(getattr(given, "partials", None)):
+        raise InvalidInputError(
+            f"{user} needs objects with value and partials, got {type(given).__name__}: try LargestPressure()"
+        )
+
+
 def _terms(objective: Any) -> tuple[tuple[float, Objective], ...]:
     return objective.terms if isinstance(objective, WeightedSum) else ((1.0, objective),)
 
@@ -270,11 +272,7 @@ class Maximum(Weighable):
                 f"Maximum needs a tuple of objectives, got {given!r}: write Maximum((first, second))"
             )
         for objective in given:
-            if not callable(getattr(objective, "partials", None)):
-                raise InvalidInputError(
-                    f"Maximum needs objectives, got {type(objective).__name__}: give objects with value and "
-                    "partials, such as LargestPressure()"
-                )
+            _require_objective(objective, "Maximum")
         object.__setattr__(self, "objectives", tuple(given))
 
     @property

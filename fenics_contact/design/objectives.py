@@ -103,8 +103,7 @@ def _finite(value: float, *derivatives: np.ndarray) -> tuple[Any, ...]:
     """Return the result of a function of contact forces if it is finite, else raise."""
     if not (np.isfinite(value) and all(np.isfinite(numbers).all() for numbers in derivatives)):
         raise InvalidInputError(
-            "ContactForces.function must return finite numbers, got NaN or infinity: check divisions by "
-            "forces that may be zero"
+            "ContactForces.function must return finite numbers, got others: check divisions by forces"
         )
     return value, *derivatives
 
@@ -125,8 +124,7 @@ class TotalPotential(Weighable):
         require_linear(state, self)
         if state.torn.fluid is not None:
             raise InvalidInputError(
-                "TotalPotential needs a scene without fluid in contacts, whose front has no potential, got "
-                "one: use StrainEnergy, contact forces or stresses"
+                "TotalPotential needs contacts without fluid, whose front has no potential: take StrainEnergy"
             )
         return state.energies.total_potential
 
@@ -170,8 +168,7 @@ class StrainEnergy(Weighable):
         require_linear(state, self)
         if any(load.temperatures for load in state.scene.loads):
             raise InvalidInputError(
-                "StrainEnergy needs a scene without ThermalStrain, whose strain stores no energy, got one: "
-                "integrate a density of your own by VolumeIntegral"
+                "StrainEnergy needs loads without ThermalStrain, got one: integrate yours by VolumeIntegral"
             )
         return state.energies.strain
 
@@ -232,11 +229,7 @@ class OfPressures(Weighable, ABC):
         mine = points_of(state, type(self).__name__, self.pair)
         force, area = contact.normal_force[mine], contact.area[mine]
         if not (force > 0.0).any():
-            where = "no contact pair" if self.pair is None else f"not contact pair {self.pair}"
-            raise InvalidDesignError(
-                f"{type(self).__name__} needs surfaces that touch, but {where} of this design transmits a "
-                "force: press the bodies together, or keep the design closer to one that touches"
-            )
+            raise nothing_touches(self, self.pair)
         value, *derivatives = self.of_points(force, area)
         by_force, by_area = np.zeros((2, contact.points.count))
         by_force[mine], by_area[mine] = derivatives
@@ -249,6 +242,15 @@ def points_of(state: State, what: str, pair: int | None) -> np.ndarray:
         return np.arange(state.contact.points.count)
     require_pair(state.scene, what, pair)
     return state.contact.on_pair(pair)
+
+
+def nothing_touches(objective: Weighable, pair: int | None) -> InvalidDesignError:
+    """Return the failure of an objective that needs contact forces."""
+    where = "no contact pair" if pair is None else f"not contact pair {pair}"
+    return InvalidDesignError(
+        f"{type(objective).__name__} needs surfaces that touch, but {where} of this design transmits a "
+        "force: press the bodies together, or keep the design closer to one that touches"
+    )
 
 
 def require_pair(scene: Scene, what: str, pair: int) -> None:
@@ -328,8 +330,7 @@ def require_exponent(what: str, p: float) -> None:
     """Check the exponent of a smooth bound of a largest value, of which powers must not overflow."""
     if not 2.0 <= p <= 100.0:
         raise InvalidInputError(
-            f"{what}.p must be a number from 2 to 100, got {p!r}: the larger, the closer to the largest "
-            "value, try 8"
+            f"{what}.p must be from 2 to 100, got {p!r}: the larger, the closer to the largest value, try 8"
         )
 
 
@@ -438,8 +439,7 @@ class FrictionWork(Weighable):
         if len(mine) == 0:
             where = "contact pairs have" if self.pair is None else f"contact pair {self.pair} has"
             raise InvalidInputError(
-                f"FrictionWork needs friction, but the scene's {where} none: give a ContactPair Coulomb or "
-                "Tresca friction"
+                f"FrictionWork needs friction, but the scene's {where} none: give Coulomb or Tresca friction"
             )
         chosen = np.zeros((contact.points.count, 1))
         chosen[mine] = 1.0

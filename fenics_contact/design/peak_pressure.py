@@ -14,8 +14,8 @@ from fenics_contact._scene.parts import surface_of
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.objective import Partials, Weighable
-from fenics_contact.design.objectives import on_rows, require_pair
-from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.design.objectives import nothing_touches, on_rows, require_pair
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.results.state import State
 
 
@@ -68,11 +68,7 @@ class PeakPressure(Weighable):
             pairs = range(self.pair, self.pair + 1)
         found = [found for pair in pairs if (found := _peak_of(state, pair)) is not None]
         if not found:
-            where = "no contact pair" if self.pair is None else f"not contact pair {self.pair}"
-            raise InvalidDesignError(
-                f"PeakPressure needs surfaces that touch, but {where} transmits a force: press the bodies "
-                "together"
-            )
+            raise nothing_touches(self, self.pair)
         return max(found, key=lambda each: each[0])
 
 

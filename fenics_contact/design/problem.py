@@ -87,8 +87,7 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
     """Return the contact problem of a shape problem."""
     if not isinstance(contact, ContactProblem):
         raise InvalidInputError(
-            f"ShapeProblem needs a ContactProblem, got {type(contact).__name__}: write "
-            "ShapeProblem(ContactProblem(scene, comm), designs, objective)"
+            f"ShapeProblem needs a ContactProblem(scene, comm), got {type(contact).__name__}: make one"
         )
     _check_differentiable(contact.scene)
     return contact
@@ -96,38 +95,23 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
 
 def _check_differentiable(scene: Scene) -> None:
     """Reject what of torsion and of large deformations has no derivative by the shape."""
-    if scene.torsion:
-        raise InvalidInputError(
-            "designs need bodies without torsion, this scene has torsion=True: optimise it with a tool that "
-            "takes plain functions, see fenics_contact.SceneResponse, or leave torsion out"
-        )
-    if any(load.stresses for load in scene.loads):
-        raise InvalidInputError(
-            "designs need bodies without an InitialStress, whose cells would carry it along, this scene has "
-            "one: leave it out"
-        )
-    if scene.has_thickness:
-        raise InvalidInputError(
-            "designs of plane bodies need materials without a thickness, forces being those of a unit of "
-            "thickness, got one: leave the thickness out, and divide forces by it"
-        )
-    if not scene.is_nonlinear:
-        return
+    materials = [each for body in scene.bodies.values() for each in body.materials]
     reasons = {
-        "materials without history": any(
-            has_history(each) for body in scene.bodies.values() for each in body.materials
-        ),
-        "materials without mean_dilatation": any(
-            has_mean_dilatation(each) for body in scene.bodies.values() for each in body.materials
-        ),
-        "pressures that do not follow their surfaces": bool(scene.following_pressures),
-        "bodies without ThermalStrain": any(load.temperatures for load in scene.loads),
+        "bodies without torsion": scene.torsion,
+        "bodies without InitialStress": any(load.stresses for load in scene.loads),
+        "plane bodies without a thickness": scene.has_thickness,
     }
+    if scene.is_nonlinear:
+        reasons |= {
+            "materials without history": any(map(has_history, materials)),
+            "materials without mean_dilatation": any(map(has_mean_dilatation, materials)),
+            "pressures that do not follow their surfaces": bool(scene.following_pressures),
+            "nonlinear bodies without ThermalStrain": any(load.temperatures for load in scene.loads),
+        }
     for needed, missing in reasons.items():
         if missing:
             raise InvalidInputError(
-                f"designs of bodies that deform much need {needed}, this scene has others: optimise it with "
-                "a tool that takes plain functions, see fenics_contact.DesignResponse"
+                f"designs need {needed}, this scene has others: leave them out, or take a SceneResponse"
             )
 
 
@@ -166,20 +150,17 @@ def check_case(first: Scene, scene: Scene) -> None:
     """Check that a scene is a load case of the same designs."""
     if set(scene.bodies) != set(first.bodies):
         raise InvalidInputError(
-            f"load cases must share their bodies, got {sorted(scene.bodies)} beside {sorted(first.bodies)}: "
-            "take the scene from dataclasses.replace(scene, loads=...) or LoadStep.applied_to(scene)"
+            f"load cases must have the same bodies, got {sorted(scene.bodies)} beside {sorted(first.bodies)}"
         )
     for name, body in scene.bodies.items():
         mate = first.bodies[name]
         if body.mesh is not mate.mesh or body.materials != mate.materials:
             raise InvalidInputError(
-                f"load cases must share their bodies, but {name!r} has another mesh or material: take the "
-                "scene from dataclasses.replace(scene, loads=...) or LoadStep.applied_to(scene)"
+                f"load cases must share meshes and materials, {name!r} has others: give other loads alone"
             )
         if not scene.holds_as(first, name):
             raise InvalidInputError(
-                f"load cases must hold the same components, their supports of {name!r} differ: give other "
-                "values, or hold by RigidSurface what only some cases move"
+                f"load cases must hold the same components of {name!r}: give values, or a RigidSurface"
             )
 
 

@@ -72,8 +72,8 @@ def _from_origin(scene: Scene, name: str, mesh: BodyMesh, given: Mapping[str, se
     before = scene.bodies[name].mesh
     if mesh.shapes:
         raise InvalidInputError(
-            f"a new mesh of {name!r}, which is in a pair that gives its gap, must have no shapes of its own, "
-            f"got those of {sorted(mesh.shapes)}: leave them out, those of the mesh before are kept"
+            f"a new mesh of {name!r}, whose pair gives its gap, must have no shapes of its own, got "
+            f"{sorted(mesh.shapes)}: leave them out, those of the mesh before are kept"
         )
     away, nearest = cKDTree(before.points).query(mesh.points)
     new = away > SAME * float(np.ptp(before.points, axis=0).max())
@@ -95,9 +95,8 @@ def _way_between(body: str, name: str, before: BodyMesh, after: BodyMesh, nodes:
     hit = project(new.points[mine], -new.normals[mine], old)  # surfaces meet that face each other
     if len(hit.point) < len(nodes):
         raise InvalidInputError(
-            f"a new mesh of {body!r} must keep {name!r}, whose gap is given, but "
-            f"{len(nodes) - len(hit.point)} of {len(nodes)} nodes do not face the one before: keep its rim, "
-            "or all facets"
+            f"a new mesh of {body!r} must keep {name!r}, whose gap is given, {len(nodes) - len(hit.point)} "
+            f"of {len(nodes)} nodes do not face the one before: keep its rim, or all facets"
         )
     weights, _ = shape_functions(hit.local, old.corners)
     moved = (before.points - before.origin.points)[old.nodes]
@@ -283,9 +282,8 @@ class Remeshed(SingleProblem):
         while (reach := self._reach(k, alpha)) < 1.0:
             if len(self.remeshings) == self.most or reach < 0.01:
                 raise InvalidDesignError(
-                    f"the design is out of reach of {len(self.problems)} meshes: the next one allows "
-                    f"{reach:.1%} of the rest (at most {self.most} are made): allow more, or give another "
-                    "mesher"
+                    f"the design is out of reach of {len(self.problems)} meshes, the next allows {reach:.1%} "
+                    f"of the rest (at most {self.most} are made): allow more, or give another mesher"
                 )
             k = self._remesh(k, self.origins[k] + reach * (alpha - self.origins[k]))
         return k

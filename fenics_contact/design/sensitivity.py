@@ -97,8 +97,8 @@ def solve_deformed_adjoint(
         raise NoAdjointError.of_loose_body()
     if found.stop is not Stop.CONVERGED:
         raise ConvergenceError(
-            f"the adjoint of the deformed state needs a relative residual below {tolerance:.1e}, not reached "
-            f"after {found.products} products ({found.stop.value}): loosen the tolerance"
+            f"the adjoint needs a relative residual below {tolerance:.1e}, not reached by {found.products} "
+            f"products ({found.stop.value}): loosen the tolerance"
         )
     moved = system.inverse(partials.by_displacement - system.force(found.multiplier))
     multiplier = found.multiplier[: len(partials.by_multiplier)]
@@ -117,8 +117,8 @@ def _require_differentiable(state: DeformedState) -> None:
         return
     if state.since > 0.0:
         raise InvalidInputError(
-            "derivatives with friction need slip that is one step from the start of the load step, here it "
-            f"begins at {state.since:.3g} of it: leave out finer_history=True, or prescribe less"
+            "derivatives with friction need slip since the start of the load step, here it begins at "
+            f"{state.since:.3g} of it: leave out finer_history=True, or prescribe less"
         )
     if isinstance(contact, MovedContact) and state.begun is None:
         raise InvalidInputError(

@@ -167,8 +167,7 @@ class LoadCases(JointProblem):
             for name, problem in self.problems.items():
                 if not isinstance(problem, ShapeProblem) or not problem.shares_with(first):
                     raise InvalidInputError(
-                        f"load cases must share designs and meshes, {name!r} shares nothing with "
-                        f"{next(iter(self.problems))!r}: make it by problem.case(scene)"
+                        f"load cases must share designs and meshes, not so {name!r}: use problem.case(scene)"
                     )
             self._total.check(self.problems)
 
@@ -307,8 +306,7 @@ class LoadPath(JointProblem):
         with together(problem.comm):
             if problem.inexact:
                 raise InvalidInputError(
-                    "LoadPath needs states that are all solved to one tolerance, as errors of a step enter "
-                    "the next one, got an adaptive one: give ShapeProblem a number as tolerance"
+                    "LoadPath needs states of one tolerance, got an adaptive one: give ShapeProblem a number"
                 )
             _check_names(names)
         self.objectives = _checked(problem.comm, names, objectives or dict.fromkeys(names, problem.objective))
@@ -435,7 +433,7 @@ def _check_names(names: Sequence[str]) -> None:
         raise InvalidInputError("LoadPath needs a load step, got none: give [LoadStep('push', loads=...)]")
     if len(set(names)) < len(names):
         raise InvalidInputError(
-            f"LoadPath needs a name for each of its steps, got {list(names)}: number those that recur"
+            f"LoadPath needs steps with different names, got {list(names)}: number those that recur"
         )
 
 
@@ -446,17 +444,14 @@ def _checked(
     with together(comm):
         if not isinstance(objectives, Mapping):
             raise InvalidInputError(
-                "LoadPath.objectives must map names of steps to objectives, got "
-                f"{type(objectives).__name__}: give {{'{names[-1]}': objective}}, or none"
+                f"LoadPath.objectives must map steps to objectives, got {type(objectives).__name__}"
             )
         if not objectives or not set(objectives) <= set(names):
             raise InvalidInputError(
-                f"LoadPath.objectives must be those of some of the steps {list(names)}, got those of "
-                f"{list(objectives)}: give {{'{names[-1]}': objective}}"
+                f"LoadPath.objectives must be those of steps {list(names)}, got those of {list(objectives)}"
             )
         if last and names[-1] not in objectives:
             raise InvalidInputError(
-                f"the last step needs an objective, as nothing depends on it otherwise, but {names[-1]!r} "
-                f"is not among {list(objectives)}: leave out the steps after the last objective"
+                f"the last step needs an objective, got those of {list(objectives)}: leave out later steps"
             )
     return {name: objectives[name] for name in names if name in objectives}

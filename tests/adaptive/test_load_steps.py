@@ -249,7 +249,7 @@ def test_histories_that_are_not_carried_are_refused() -> None:
     }
     for what, each in cases.items():
         known = cast("State", SimpleNamespace(scene=each))
-        with pytest.raises(InvalidInputError, match=f"are carried there, that of {what} is not"):
+        with pytest.raises(InvalidInputError, match=f"carry histories, but not that of {what}"):
             TransferredState(known, {}).check(each)
 
 

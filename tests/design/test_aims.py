@@ -265,7 +265,7 @@ def test_bodies_surfaces_and_nodes_that_are_not_there_are_refused() -> None:
 @pytest.mark.parametrize("p", [0.5, 1.9, -8.0, 101.0, np.nan, np.inf])
 def test_exponents_that_smooth_too_much_or_overflow_are_refused(kind: type, p: float) -> None:
     given = {"body": "block"} if kind is LargestStress else {}
-    with pytest.raises(InvalidInputError, match=f"{kind.__name__}.p must be a number from 2 to 100, got"):
+    with pytest.raises(InvalidInputError, match=f"{kind.__name__}.p must be from 2 to 100, got"):
         kind(**given, p=p)
 
 
@@ -293,7 +293,7 @@ def test_work_of_friction_needs_friction() -> None:
 
 def test_strain_energy_of_a_heated_body_is_refused_and_its_stress_is_not() -> None:
     hot = Column(1.0, 1.0).state(ThermalStrain("block", 50.0))
-    assert refused(StrainEnergy(), hot).startswith("StrainEnergy needs a scene without ThermalStrain")
+    assert refused(StrainEnergy(), hot).startswith("StrainEnergy needs loads without ThermalStrain")
     # It expands freely: no stress is added.
     assert value(LargestStress("block"), hot) == pytest.approx(PRESSURE, rel=1e-6)
 
@@ -412,13 +412,15 @@ def test_the_terms_count() -> None:
 
 @pytest.mark.parametrize("weight", [np.nan, np.inf, "2", None])
 def test_a_weight_that_is_no_finite_number_is_refused(weight: object) -> None:
-    with pytest.raises(InvalidInputError, match="multiplied by a finite number, got"):
+    with pytest.raises(InvalidInputError, match="weight must be a finite number, got"):
         weight * ENERGY  # type: ignore[operator]
 
 
 @pytest.mark.parametrize("other", [1.0, "energy", None])
 def test_what_is_no_objective_is_not_added(other: object) -> None:
-    with pytest.raises(InvalidInputError, match=f"got {type(other).__name__}: add an object with"):
+    with pytest.raises(
+        InvalidInputError, match=f"objects with value and partials, got {type(other).__name__}"
+    ):
         ENERGY + other  # type: ignore[operator]
 
 

@@ -275,7 +275,7 @@ def test_what_has_no_derivative_is_named() -> None:
         design_problem(pressed("plane", 0.0, 0.0), StrainEnergy()).evaluate(np.zeros(4))
     finer = AutomaticSteps(first=0.5, finer_history=True)
     far = design_problem(pressed("block", 0.3, 0.1), PressureNorm(), steps=finer)
-    with pytest.raises(InvalidInputError, match=r"one step from the start of .* begins at 0\.5 of it"):
+    with pytest.raises(InvalidInputError, match=r"since the start of the load step, .* begins at 0\.5 of it"):
         far.evaluate(np.zeros(far.size))
     problem = design_problem(pressed("plane", 0.0, 0.0), PressureNorm())
     with pytest.raises(InvalidInputError, match="checkpoints of designs need linear materials"):

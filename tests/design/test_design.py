@@ -123,9 +123,7 @@ def test_the_boundary_beyond_the_transition_strip_keeps_its_place(width: float |
 
 @pytest.mark.parametrize("net", [(0, 3), (4, -1)])
 def test_a_net_without_control_points_is_refused(net: tuple[int, int]) -> None:
-    with pytest.raises(
-        InvalidInputError, match=r"at least one control point each way, got \(.*\): try \(7, 4\), for"
-    ):
+    with pytest.raises(InvalidInputError, match=r"control points each way, got \(.*\): try \(7, 4\), for"):
         crown(net)
 
 
@@ -133,7 +131,7 @@ def test_a_net_finer_than_the_mesh_is_refused() -> None:
     counts = crossed_links().first.crown.counts
     assert crown(counts).size == counts[0] * counts[1]
     for net in ((counts[0] + 1, 2), (2, counts[1] + 1)):
-        with pytest.raises(InvalidInputError, match="use fewer control points or a finer mesh"):
+        with pytest.raises(InvalidInputError, match="use fewer points or finer cells"):
             crown(net)
 
 
@@ -170,7 +168,7 @@ def test_a_net_that_the_nodes_do_not_feel_is_refused() -> None:
     assert SurfaceDesign("brick", top, (3, 3)).on(scene).size == 9
     with pytest.raises(
         InvalidInputError,
-        match=r"9 control points move the nodes in only 5 independent ways \(variables 1, 2, .* use fewer",
+        match=r"nodes move only in 5 ways \(variables 1, 2, .* use fewer",
     ):
         SurfaceDesign("brick", along, (3, 3)).on(scene)
 
@@ -382,9 +380,7 @@ def test_nodes_that_are_to_move_and_to_stay_are_refused() -> None:
     body = scene.bodies["brick"]
     decomposition = decompose(scene, {"brick": box_partition(body.mesh, (2, 1, 1))}, MPI.COMM_SELF)
     top, side = (np.unique(body.mesh.surfaces[name]) for name in ("z1", "x0"))
-    with pytest.raises(
-        InvalidInputError, match=r"4 nodes of body 'brick' lie on both: choose another surface"
-    ):
+    with pytest.raises(InvalidInputError, match=r"4 nodes of body 'brick' lie on both: choose another"):
         MeshMotion(decomposition, "brick", body, top, marks(body, side))
 
 
@@ -425,5 +421,5 @@ def test_a_plane_of_symmetry_holds_only_what_is_across_it() -> None:
     assert np.all(moved[np.unique(mesh.surfaces["z0"])] == 0.0)
     by_points = np.random.default_rng(5).standard_normal(mesh.points.shape)
     assert geometry.pull_back(by_points) @ alpha == pytest.approx(10.0 * np.sum(moved * by_points), rel=1e-12)
-    with pytest.raises(InvalidInputError, match="16 nodes of that on 'brick' would leave it"):
+    with pytest.raises(InvalidInputError, match="16 nodes of that on 'brick' would leave one"):
         DesignGeometry(scene, decomposition, [SurfaceDesign("brick", "x0", (3, 2))])

@@ -133,17 +133,17 @@ def test_two_ranks_find_the_same(mpirun: Callable[..., str]) -> None:
     [
         (
             lambda s: {"bodies": {"lower": s.bodies["lower"]}, "loads": [], "contacts": []},
-            "share their bodies, got",
+            "have the same bodies, got",
         ),
         (
             lambda s: {
                 "bodies": {**s.bodies, "upper": Body(s.bodies["upper"].mesh, RUBBER.__class__(7.0, 0.1))}
             },
-            "'upper' has another mesh or material",
+            "'upper' has others",
         ),
         (
             lambda s: {"supports": [Support("lower", "z0", (0.0, None, 0.0))]},
-            "their supports of 'lower' differ",
+            "the same components of 'lower'",
         ),
     ],
 )
@@ -155,9 +155,7 @@ def test_what_is_no_load_case_is_refused(change: Callable[[Scene], Any], words: 
 
 def test_cases_that_share_nothing_are_refused() -> None:
     own, other = cases(True).problems["pressed"], cases(False).problems["dragged"]
-    with pytest.raises(
-        InvalidInputError, match=r"'other' shares nothing with 'own': make it by problem\.case"
-    ):
+    with pytest.raises(InvalidInputError, match=r"not so 'other': use problem\.case"):
         LoadCases({"own": own, "other": other})
     with pytest.raises(InvalidInputError, match="LoadCases needs a problem"):
         LoadCases({})

@@ -69,9 +69,14 @@ def test_what_is_not_there_is_refused(column: State) -> None:
         StressNear("column", (0, 0), 0.0)
     with pytest.raises(InvalidInputError, match=r"component must be one of \['von_mises', 'xx'.*got 'rr'"):
         StressNear("column", (0, 0), 1.0, "rr")
-    with pytest.raises(InvalidInputError, match=r"at must have 2 coordinates in this scene, got \(0, 0, 1\)"):
+    with pytest.raises(
+        InvalidInputError, match=r"at must be a place of 2 coordinates in the body, got \(0, 0, 1\)"
+    ):
         value(StressNear("column", (0, 0, 1), 1.0), column)
-    with pytest.raises(InvalidInputError, match=r"none within 0.5 of \(5.0, 0.0\): give a place in the body"):
+    with pytest.raises(
+        InvalidInputError,
+        match=r"within 0.5 of its place, got none at \(5.0, 0.0\): give a place in the body",
+    ):
         value(StressNear("column", (5, 0), 0.5), column)
     with pytest.raises(
         InvalidInputError, match=r"MovementNear.body must name a body of the scene, got 'top'"

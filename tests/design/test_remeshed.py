@@ -133,7 +133,7 @@ def test_the_mesh_motion_of_a_design_is_computed_once_for_each_mesh(monkeypatch:
 
 def test_a_design_out_of_reach_is_refused_in_words() -> None:
     few = Remeshed(bridge_problem(bridge("hexahedron", COUNTS)), most=1)
-    with pytest.raises(InvalidDesignError, match=r"out of reach of 2 meshes: .* \(at most 1 are made\)"):
+    with pytest.raises(InvalidDesignError, match=r"out of reach of 2 meshes, .* \(at most 1 are made\)"):
         few(FAR)
 
 
@@ -287,6 +287,6 @@ def test_a_new_mesh_that_hides_where_its_surfaces_were_is_refused_in_words() -> 
         side = float(mesh.points[mesh.surfaces["x0"], 0].min())
         return again(mesh).with_shapes({"x0": Plane((side, 0.0), (-1.0, 0.0))})
 
-    with pytest.raises(InvalidInputError, match=r"must have no shapes of its own, got those of"):
+    with pytest.raises(InvalidInputError, match=r"must have no shapes of its own, got"):
         Remeshed(pressed(gap=0.006), shaped, share=0.93)(REMESHED_GAPS_FAR)
     Remeshed(pressed(), shaped, share=0.93)(REMESHED_GAPS_FAR)

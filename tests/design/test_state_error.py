@@ -277,9 +277,7 @@ def test_states_of_one_tolerance_are_as_exact_as_they_get() -> None:
 
 @pytest.mark.parametrize(("loosest", "tightest"), [(1e-3, 1e-2), (1.0, 1e-8), (1e-3, 0.0)])
 def test_tolerances_that_are_no_range_are_refused(loosest: float, tightest: float) -> None:
-    with pytest.raises(
-        InvalidInputError, match=r"0 < tightest <= loosest < 1, got .*: try AdaptiveTolerance"
-    ):
+    with pytest.raises(InvalidInputError, match=r"0 < tightest <= loosest < 1, got "):
         AdaptiveTolerance(loosest, tightest)
 
 

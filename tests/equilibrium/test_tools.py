@@ -342,7 +342,7 @@ def test_a_tool_on_rubber_moves_and_turns_as_an_obstacle_that_moves() -> None:
 def test_tools_need_materials_that_are_linear_or_for_large_deformations() -> None:
     yielding = rubber(ToolMotion("left", (0, 0, -0.1), STRAIGHT))
     metal = Body(yielding.deforming["block"].mesh, J2Plasticity(1000.0, 0.3, 5.0))
-    with pytest.raises(InvalidInputError, match="RigidTool needs linear materials or those for large deform"):
+    with pytest.raises(InvalidInputError, match="RigidTool needs linear materials or large deformations"):
         solve_scene(Scene({"block": metal}, yielding.supports, contacts=yielding.contacts), MPI.COMM_SELF)
 
 

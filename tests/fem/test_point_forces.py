@@ -132,9 +132,7 @@ def test_derivatives_by_the_shape_keep_forces_at_nodes_as_they_are() -> None:
 
     scene = Scene({"bar": Body(BAR, STEEL)}, [Support("bar", "x0")], [PointForce("bar", "end", lambda x: x)])
     state = solve_scene(scene, MPI.COMM_SELF)
-    with pytest.raises(
-        InvalidInputError, match=r"need forces at nodes as numbers, got a function of the points"
-    ):
+    with pytest.raises(InvalidInputError, match=r"need forces at nodes as numbers, got a function"):
         moving_loads(state.torn, None)
 
 

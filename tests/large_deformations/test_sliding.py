@@ -420,7 +420,5 @@ def test_a_load_step_has_its_duration_whole_and_in_parts_if_asked_for(finer: boo
 def test_time_must_not_run_backwards() -> None:
     sequence = LoadSequence(ContactProblem(solid(), MPI.COMM_SELF))
     sequence.advance(LoadStep("later", supports=held(0.01), time=2.0))
-    with pytest.raises(
-        InvalidInputError, match=r"time of load steps must not decrease .* got 1 after 2: give"
-    ):
+    with pytest.raises(InvalidInputError, match=r"time must not decrease, got 1 after 2: give"):
         sequence.advance(LoadStep("earlier", supports=held(0.01), time=1.0))

@@ -103,7 +103,7 @@ def test_a_net_is_a_number_or_a_pair(net: object) -> None:
     ("change", "message"),
     [
         ({"surface": "z7"}, "body 'upper': a design needs a surface whose .* grid"),
-        ({"net": [9, 9]}, "a net of \\(9, 9\\) control points needs at least as many nodes each way"),
+        ({"net": [9, 9]}, "a net \\(9, 9\\) needs as many nodes each way"),
         ({"body": "uper"}, 'design.surfaces.0.body must be a body, one of .*, got "uper"'),
     ],
 )

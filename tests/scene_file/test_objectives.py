@@ -221,9 +221,9 @@ def test_some_steps_count_and_another_objective_is_limited_after_one() -> None:
     ("text", "more", "said"),
     [
         (GOOD, {"over_steps": ["push"]}, "name load steps, the file has none"),
-        (STEPS, {"over_steps": ["push"]}, r"those of some of the steps \['pressed'"),
+        (STEPS, {"over_steps": ["push"]}, r"those of steps \['pressed'"),
         (STEPS, {"over_steps": ["pressed"]}, "the last step needs an objective"),
-        (STEPS, {"adaptive": True}, "all solved to one tolerance"),
+        (STEPS, {"adaptive": True}, "states of one tolerance"),
         (
             STEPS,
             {
