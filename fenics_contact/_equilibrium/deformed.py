@@ -140,7 +140,7 @@ class DeformedEquilibria:
             raise LoadStepError(words, failure.history, last) from failure
         return _state_after(path, before, timer, steps)
 
-    def _start(self, scene: Scene, previous: Previous) -> _FromRest:
+    def _start(self, scene: Scene, previous: Previous) -> _FromRest | _FromState:
         """Return where a load step begins. Collective."""
         before = previous.last
         if not isinstance(before, DeformedState):
@@ -288,7 +288,7 @@ class _FromRest:
     """A load step of bodies at rest, without loads."""
 
     time = 0.0
-    known: Linearisation | None = None
+    known = None
 
     def loads(self, load: Loading, contact: Contact) -> tuple[Loading, Loading]:
         """Return what acts at its start and its end. Collective."""
@@ -301,7 +301,7 @@ class _FromRest:
 
 
 @dataclass(frozen=True, eq=False)
-class _FromState(_FromRest):
+class _FromState:
     """A load step after a state; `acted`: what acted there; `at`: where it ended."""
 
     before: DeformedState
@@ -310,7 +310,7 @@ class _FromState(_FromRest):
     known: Linearisation | None
 
     @property
-    def time(self) -> float:  # type: ignore[override]
+    def time(self) -> float:
         return self.at.time
 
     def loads(self, load: Loading, contact: Contact) -> tuple[Loading, Loading]:

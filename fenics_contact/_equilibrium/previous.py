@@ -14,10 +14,9 @@ from fenics_contact._equilibrium.other_rows import (
     on_rows_of,
     with_kept,
 )
-from fenics_contact._equilibrium.starts import NoStart, checked_start
+from fenics_contact._equilibrium.starts import NoStart, Start, checked_start
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.torn import TornSystem, build_torn_system, with_points_inside
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.results.dual_solve import sticking
@@ -64,24 +63,13 @@ class Equilibria(Protocol):
         """Build a state from what was stored of it. Collective; `known`: of which parts may be reused."""
 
 
-class NoEquilibria:
-    """What finds no equilibria, as none have been looked for."""
-
-    #: The last system, of which parts may be reused.
-    assembled: TornSystem | None = None
-
-    def serves(self, scene: Scene, decomposition: Decomposition) -> bool:
-        """Return whether a scene has the meshes, the held components and the contact pairs of these."""
-        return False
-
-
 class Undeformed:
     """Bodies at rest, before the first load step."""
 
     #: The state at the end of the load step before, also on other meshes.
-    last: State | None = None
+    last = None
     #: The same on the meshes of the scene, from which its solution starts.
-    here: State | None = None
+    here = None
 
     def check(self, scene: Scene) -> None:
         """Reject what cannot be carried to the meshes of a scene."""
@@ -96,14 +84,17 @@ class Undeformed:
 
 
 @dataclass(frozen=True, eq=False)
-class AfterState(Undeformed):
+class AfterState:
     """A load step after a state on the meshes of the scene."""
 
     last: State
 
     @property
-    def here(self) -> State | None:  # type: ignore[override]
+    def here(self) -> State:
         return self.last
+
+    def check(self, scene: Scene) -> None:
+        pass
 
     def kept(self, scene: Scene) -> Scene:
         return continued(with_kept(scene, self.last), kept_by_joints(self.last))
@@ -119,13 +110,15 @@ class AfterState(Undeformed):
 
 
 @dataclass(frozen=True, eq=False)
-class AfterTransfer(Undeformed):
+class AfterTransfer:
     """A load step after a state on other meshes."""
 
     before: TransferredState
 
+    here = None
+
     @property
-    def last(self) -> State | None:  # type: ignore[override]
+    def last(self) -> State:
         return self.before.state
 
     def check(self, scene: Scene) -> None:
@@ -140,7 +133,11 @@ class AfterTransfer(Undeformed):
         return torn.with_slip_from(*self.before.slip_origin(with_points_inside(was, torn)))
 
 
-def after(before: State | TransferredState | None) -> Undeformed:
+#: What a load step goes on from.
+Before = Undeformed | AfterState | AfterTransfer
+
+
+def after(before: State | TransferredState | None) -> Before:
     """Return what a load step goes on from."""
     if before is None:
         return Undeformed()
@@ -155,8 +152,8 @@ class Previous:
     whose multipliers come first; `known`: of which parts may be reused; None: nothing.
     """
 
-    before: Undeformed
-    start: NoStart = field(default_factory=NoStart)
+    before: Before
+    start: Start = field(default_factory=NoStart)
     known: State | None = None
 
     @property

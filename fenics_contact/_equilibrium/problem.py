@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.linear import DirectEquilibria, LinearEquilibria, default_solver
 from fenics_contact._equilibrium.other_rows import continued
-from fenics_contact._equilibrium.previous import ONLY_STEP, Equilibria, NoEquilibria, Previous, Wanted, after
+from fenics_contact._equilibrium.previous import ONLY_STEP, Equilibria, Previous, Wanted, after
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._equilibrium.warnings import ContactWarnings, DeferredWarnings
 from fenics_contact._scene.memory import Fit
@@ -83,7 +83,7 @@ class ContactProblem:
     _decomposition: Decomposition | None
     #: The scene whose supports hold what the decomposition does.
     _held_by: Scene | None = None
-    _deformed_equilibria: DeformedEquilibria | NoEquilibria = NoEquilibria()
+    _deformed_equilibria: DeformedEquilibria | None = None
 
     def _facts(self) -> dict[str, Any]:
         return {
@@ -296,11 +296,13 @@ class ContactProblem:
         from fenics_contact._equilibrium.deformed import DeformedEquilibria
 
         decomposition, last = self._decomposed(scene), self._deformed_equilibria
-        if last.serves(scene, decomposition):
-            return cast("DeformedEquilibria", last)
-        found = DeformedEquilibria(scene, decomposition, self.steps, self.timer, last.assembled)
-        self._deformed_equilibria = found
-        return found
+        if last and last.serves(scene, decomposition):
+            return last
+        assembled = last.assembled if last else None
+        self._deformed_equilibria = last = DeformedEquilibria(
+            scene, decomposition, self.steps, self.timer, assembled
+        )
+        return last
 
     @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)
     def restore(self, stored: Stored, scene: Scene | None = None) -> AnyState:

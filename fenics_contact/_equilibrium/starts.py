@@ -36,7 +36,7 @@ def known_system(state: State | None) -> DualSystem | None:
     return state.reusable if state else None
 
 
-def checked_start(scene: Scene, start: State | None, refinements: Mapping[str, Refinement] | None) -> NoStart:
+def checked_start(scene: Scene, start: State | None, refinements: Mapping[str, Refinement] | None) -> Start:
     """Return what multipliers are guessed from: a state on the meshes of a scene, or on coarser ones."""
     if start is None:
         if refinements is not None:
@@ -61,18 +61,19 @@ class NoStart:
 
     is_coarser = False
     #: The state on the meshes of the scene, of which parts may be reused.
-    here: State | None = None
+    here = None
 
-    def first_guess(self, system: DualSystem) -> np.ndarray | None:
+    def first_guess(self, system: DualSystem) -> None:
         """Return multipliers on the rows of a system, owned, None without any. Collective."""
-        return None
 
 
 @dataclass(frozen=True, eq=False)
-class SameMeshes(NoStart):
+class SameMeshes:
     """A state on the meshes of the scene as start."""
 
     here: State
+
+    is_coarser = False
 
     def first_guess(self, system: DualSystem) -> np.ndarray | None:
         old = self.here.reusable
@@ -173,7 +174,7 @@ def _put(torn: TornSystem, vector: np.ndarray, rows: np.ndarray, values: np.ndar
 
 
 @dataclass(frozen=True, eq=False)
-class CoarseStart(NoStart):
+class CoarseStart:
     """A state as start on meshes that were refined from its own, by nested iteration.
 
     Displacements u and tractions of contact are interpolated. The gluing forces follow from those, by the
@@ -195,6 +196,7 @@ class CoarseStart(NoStart):
     refinements: Mapping[str, Refinement | MeshTransfer]
 
     is_coarser = True
+    here = None
 
     def fits(self, scene: Scene) -> bool:
         """Return whether the refinements may lead to the meshes of a scene."""
@@ -271,6 +273,10 @@ class CoarseStart(NoStart):
             return nodal
         refinement, coarse = self.refinements[name], self.state.scene.bodies[name].mesh
         return interpolated(coarse, refinement, scene.bodies[name].mesh, nodal)
+
+
+#: What multipliers are guessed from.
+Start = NoStart | SameMeshes | CoarseStart
 
 
 def _leads_to(coarse: BodyMesh, refinement: Refinement | MeshTransfer | None, fine: BodyMesh) -> bool:
