@@ -125,7 +125,7 @@ class FluidFront:
 
     def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
         """Return where fluid is."""
-        return {} if torn.fluid is None else {"wet": torn.fluid.wet}
+        return {} if torn.fluid.wet is None else {"wet": torn.fluid.wet}
 
     def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
         """Return the system with fluid where it was. Collective."""

@@ -269,10 +269,9 @@ def contact_by_shape(
     by_area = bounds_by_area(torn, rows.normal[0], by_bound) + by_area
     with together(torn.decomposition.comm):
         np.add.at(result, points.slave, bounds_by_place(torn, rows.normal[0], by_bound))
-    if torn.fluid is not None:
-        pressure = torn.fluid.pressure
-        by_area = np.asarray(by_area + pressure * np.einsum("nd,nd->n", points.normal, rows.relative[0]))
-        rows = replace(rows, normal=rows.normal + np.stack([pressure * points.area, 0.0 * pressure]))
+    pressure = torn.fluid.pressure
+    by_area = np.asarray(by_area + pressure * np.einsum("nd,nd->n", points.normal, rows.relative[0]))
+    rows = replace(rows, normal=rows.normal + np.stack([pressure * points.area, 0.0 * points.area]))
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
         if pair.by_mortar:

@@ -122,7 +122,7 @@ class TotalPotential(Weighable):
     def value(self, state: State, forms: ShapeForms) -> float:
         """Return the total potential energy; raises as `require_linear` does, and with fluid."""
         require_linear(state, self)
-        if state.torn.fluid is not None:
+        if state.torn.fluid.wet is not None:
             raise InvalidInputError(
                 "TotalPotential needs contacts without fluid, whose front has no potential: take StrainEnergy"
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -83,11 +83,11 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class FluidLoad:
-    """What fluid between surfaces exerts."""
+    """What fluid between surfaces exerts: nothing by default, where there is none."""
 
-    load: np.ndarray
-    wet: np.ndarray
-    pressure: np.ndarray
+    load: np.ndarray | float = 0.0
+    wet: np.ndarray | None = None
+    pressure: np.ndarray | float = 0.0
 
 
 @displayed
@@ -112,7 +112,7 @@ class TornSystem:
         slid: Tangential displacement of the points without friction, which have no such rows, at the origin
             of slip, replicated, shape (n_contact − n_friction, dim − 1), [length].
         free: The free motions of rigid surfaces and unknowns of joints, which add Q q to c.
-        fluid: Load and place of fluid between surfaces; None without any.
+        fluid: Load and place of fluid between surfaces.
     """
 
     scene: Scene
@@ -125,7 +125,7 @@ class TornSystem:
     right: np.ndarray
     slid: np.ndarray
     free: FreeMotions
-    fluid: FluidLoad | None = None
+    fluid: FluidLoad = field(default_factory=FluidLoad)
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
@@ -364,8 +364,7 @@ class TornSystem:
     @property
     def load(self) -> np.ndarray:
         """This rank's torn load f, shape (torn_size,), [force]."""
-        load = np.concatenate([subdomain.load for subdomain in self.subdomains])
-        return load if self.fluid is None else load + self.fluid.load
+        return np.concatenate([subdomain.load for subdomain in self.subdomains]) + self.fluid.load
 
     def with_fluid(self, pressure: np.ndarray, wet: np.ndarray) -> TornSystem:
         """Return the system with fluid that presses surfaces apart as normal forces do. Collective.

@@ -96,5 +96,5 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
         torn.points.area,
         torn.points.area,
         torn.scene.kinematics.balanced,
-        None if torn.fluid is None else torn.fluid.wet,
+        torn.fluid.wet,
     )
