@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -85,11 +87,11 @@ def test_large_strains_are_even_as_well() -> None:
     np.testing.assert_allclose(state.gather_displacement("bar"), exact, atol=1e-7)
 
 
-def test_every_number_of_ranks_has_the_same_answer(mpirun) -> None:  # type: ignore[no-untyped-def]
+@pytest.mark.parametrize("ranks", [2, 4])
+def test_every_number_of_ranks_has_the_same_answer(ranks: int, mpirun: Callable[..., str]) -> None:
     alone = np.array(displacement_on(MPI.COMM_SELF))
-    for ranks in (2, 4):
-        answer = displacement_of("tests.fem.graded", ranks, mpirun)
-        np.testing.assert_allclose(answer, alone, atol=1e-9 * np.abs(alone).max())
+    answer = displacement_of("tests.fem.graded", ranks, mpirun)
+    np.testing.assert_allclose(answer, alone, atol=1e-9 * np.abs(alone).max())
 
 
 def test_subdomains_of_different_density_need_no_more_products_than_even_ones() -> None:

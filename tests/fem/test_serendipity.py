@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -68,11 +70,11 @@ def test_a_bent_bar_of_distorted_cells_moves_as_in_calculix() -> None:
     assert np.abs(complete.gather_displacement("bar") - moved).max() > 1e-3 * np.abs(moved).max()
 
 
-def test_every_number_of_ranks_has_the_same_answer(mpirun) -> None:  # type: ignore[no-untyped-def]
+@pytest.mark.parametrize("ranks", [2, 4])
+def test_every_number_of_ranks_has_the_same_answer(ranks: int, mpirun: Callable[..., str]) -> None:
     alone = np.array(displacement_on(MPI.COMM_SELF))
-    for ranks in (2, 4):
-        answer = displacement_of("tests.fem.serendipity", ranks, mpirun)
-        np.testing.assert_allclose(answer, alone, atol=1e-9 * np.abs(alone).max())
+    answer = displacement_of("tests.fem.serendipity", ranks, mpirun)
+    np.testing.assert_allclose(answer, alone, atol=1e-9 * np.abs(alone).max())
 
 
 @pytest.mark.parametrize("pair", [ContactPair, Tie])

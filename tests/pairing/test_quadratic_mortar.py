@@ -271,7 +271,8 @@ def test_a_press_fit_of_a_step_file_has_its_pressure_at_every_node(
     np.testing.assert_allclose(state.contact.pressure, lame(), rtol=0.03)
 
 
-def test_ranks_have_the_same_pressures(mpirun: Callable[..., str]) -> None:
+@pytest.mark.parametrize("ranks", [2, 4])
+def test_ranks_have_the_same_pressures(ranks: int, mpirun: Callable[..., str]) -> None:
     code = """
         from mpi4py import MPI
         from fenics_contact import solve_scene
@@ -284,6 +285,5 @@ def test_ranks_have_the_same_pressures(mpirun: Callable[..., str]) -> None:
     alone = solved(unevenly()).contact
     assert alone.pressure.max() > PRESSURE
     assert alone.normal_force.sum() == pytest.approx(PRESSURE)
-    for ranks in (2, 4):
-        found = [float.fromhex(p) for p in mpirun(code, ranks).split()]
-        np.testing.assert_allclose(found, alone.pressure, rtol=1e-8, atol=1e-6)
+    found = [float.fromhex(p) for p in mpirun(code, ranks).split()]
+    np.testing.assert_allclose(found, alone.pressure, rtol=1e-8, atol=1e-6)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import meshio
 import numpy as np
 import pytest
@@ -42,18 +44,17 @@ def test_a_model_of_all_shapes_is_one_body(bars: dict[str, BodyMesh]) -> None:
     assert bars["serendipity"].n_nodes == bars["quadratic"].n_nodes
 
 
+@pytest.mark.parametrize("ranks", [1, 2, 4])
 def test_a_model_of_all_shapes_has_an_even_stress_on_every_number_of_ranks(
-    bars: dict[str, BodyMesh],
-    mpirun,  # type: ignore[no-untyped-def]
+    bars: dict[str, BodyMesh], ranks: int, mpirun: Callable[..., str]
 ) -> None:
-    """Linear, quadratic and serendipity, in five subdomains on 1, 2 and 4 ranks."""
+    """Linear, quadratic and serendipity, in five subdomains."""
     exact = np.concatenate([mesh.points * [0.01, -0.003, -0.003] for mesh in bars.values()])
-    for ranks in (1, 2, 4):
-        if ranks == 1:
-            answer = np.array(displacement_on(MPI.COMM_SELF, bars))
-        else:
-            answer = displacement_of("tests.readers.four_boxes", ranks, mpirun)
-        np.testing.assert_allclose(answer, exact, atol=1e-10 * np.abs(exact).max())
+    if ranks == 1:
+        answer = np.array(displacement_on(MPI.COMM_SELF, bars))
+    else:
+        answer = displacement_of("tests.readers.four_boxes", ranks, mpirun)
+    np.testing.assert_allclose(answer, exact, atol=1e-10 * np.abs(exact).max())
 
 
 def as_meshio(mesh: BodyMesh, lacking: bool) -> meshio.Mesh:
