@@ -24,7 +24,7 @@ from fenics_contact._scene.preloads import Preload, Section
 from fenics_contact._scene.sectors import CyclicSymmetry
 from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import RigidSurface, Roller, Support, ToolMotion
-from fenics_contact._scene_file.part import Part, built, keys_of, not_in_files, table_of
+from fenics_contact._scene_file.part import Part, built, keys_of, nodes_of, not_in_files, table_of
 from fenics_contact._scene_file.values import (
     FREE,
     OF_SCALAR,
@@ -58,12 +58,6 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from fenics_contact._scene.body import Body
-
-
-def nodes_of(bodies: Mapping[str, Body], body: str, surface: str) -> np.ndarray:
-    """Return the nodes of a surface, shape (n, dim)."""
-    mesh = bodies[body].mesh
-    return np.asarray(mesh.points[mesh.nodes_of(surface)])
 
 
 @dataclass(frozen=True)

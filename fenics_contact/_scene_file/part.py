@@ -17,6 +17,7 @@ from typing import (
     get_type_hints,
 )
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, create_model, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
@@ -109,9 +110,8 @@ class Part(BaseModel):
     def check_formulas(self, made: Any, bodies: Mapping[str, Body]) -> None:
         """Evaluate the formulas of the object of the table at nodes, as solvers will."""
         if callable(value := getattr(made, "value", None)):
-            body = bodies[made.body]
             named = getattr(made, "surface", getattr(made, "nodes", None))
-            value(body.mesh.points if named is None else body.mesh.points[body.mesh.nodes_of(named)])
+            value(bodies[made.body].mesh.points if named is None else nodes_of(bodies, made.body, named))
 
     @classmethod
     def describes(cls, made: object) -> bool:
@@ -229,6 +229,12 @@ def _field(
 def not_in_files(what: str) -> InvalidInputError:
     """Return an error about what cannot be written, which says what scene files have instead."""
     return InvalidInputError(f"a scene file has {what}: run the deck, or read it in Python")
+
+
+def nodes_of(bodies: Mapping[str, Body], body: str, surface: str) -> np.ndarray:
+    """Return the nodes of a surface, shape (n, dim)."""
+    mesh = bodies[body].mesh
+    return np.asarray(mesh.points[mesh.nodes_of(surface)])
 
 
 def values_of(data: Any, key: str, path: Path = ()) -> Iterator[tuple[Path, Any]]:
