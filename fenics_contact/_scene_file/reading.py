@@ -95,8 +95,9 @@ class Builder:
             with self._at("bodies", name):
                 chosen[name] = self._part_of(name, body, shapes[body.mesh])
                 made_of: Any = body.material
-                given: Any = materials[made_of] if isinstance(made_of, str) else None
-                if given is None:
+                if isinstance(made_of, str):
+                    given: Any = materials[made_of]
+                else:
                     given = {region: materials[part] for region, part in made_of.items()}
                 ways = body.axisymmetric, body.torsion, body.integration
                 made[name] = Body(chosen[name].mesh, given, *ways)

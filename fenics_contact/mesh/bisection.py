@@ -7,7 +7,9 @@ References:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -104,6 +106,18 @@ class _Cut:
     cost: float
 
 
+#: Behind which cells cuts are allowed, by the places of the cells along a direction in their order.
+_Allowed: TypeAlias = Callable[[np.ndarray], np.ndarray]
+
+
+def _between_layers(places: np.ndarray) -> np.ndarray:
+    return np.diff(places) > 0
+
+
+def _anywhere(places: np.ndarray) -> np.ndarray:
+    return np.ones(len(places) - 1, dtype=bool)
+
+
 @dataclass(frozen=True, eq=False)
 class _Piece:
     """A piece of a mesh that is to become several subdomains.
@@ -127,8 +141,11 @@ class _Piece:
 
     def halves(self) -> tuple[_Piece, _Piece]:
         """Cut it in two by the cheapest cut."""
-        best = self._best(between_layers=True) or self._best(between_layers=False)
-        assert best is not None  # a piece has as many cells as subdomains
+        cuts = self._cuts(_between_layers) or self._cuts(_anywhere)  # a piece has as many cells as subdomains
+        best = cuts[0]  # the first of equivalent ones
+        for cut in cuts[1:]:
+            if cut.cost < (1.0 - ALIKE) * best.cost:
+                best = cut
         before = np.zeros(len(self.cells), dtype=bool)
         before[best.order[: best.cells]] = True
         return (
@@ -136,14 +153,10 @@ class _Piece:
             self._part(~before, self.parts - best.parts),
         )
 
-    def _best(self, between_layers: bool) -> _Cut | None:
-        """Return the cheapest cut, the first of equivalent ones."""
-        best: _Cut | None = None
-        for place, order in self._directions():
-            cut = self._across(place, order, between_layers)
-            if cut is not None and (best is None or cut.cost < (1.0 - ALIKE) * best.cost):
-                best = cut
-        return best
+    def _cuts(self, allowed: _Allowed) -> list[_Cut]:
+        """Return the cheapest cut normal to each direction that has one."""
+        ways = self._directions()
+        return [cut for place, order in ways for cut in self._across(order, allowed(place[order]))]
 
     def _directions(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """List the positions of the cells along the directions, and their orders, each (n,)."""
@@ -155,22 +168,20 @@ class _Piece:
             along += [(place, np.argsort(place, kind="stable")) for place in turned]
         return along
 
-    def _across(self, place: np.ndarray, order: np.ndarray, between_layers: bool) -> _Cut | None:
-        """Return the cheapest cut normal to a direction, None if there is none between layers."""
+    def _across(self, order: np.ndarray, allowed: np.ndarray) -> list[_Cut]:
+        """Return the cheapest cut normal to a direction, if there is one where cuts are allowed."""
         n, total = len(order), self.weights.sum()
         cells, before = np.arange(1, n), np.cumsum(self.weights[order])[:-1]
         least = min(-(-self.parts // 3), self.parts // 2)
         parts = np.clip(np.round(self.parts * before / total), least, self.parts - least)
-        possible = (cells >= parts) & (n - cells >= self.parts - parts)
-        if between_layers:
-            possible &= np.diff(place[order]) > 0
+        possible = (cells >= parts) & (n - cells >= self.parts - parts) & allowed
         if not possible.any():
-            return None
+            return []
         sizes = np.array([before / parts, (total - before) / (self.parts - parts)])
         uneven = UNEVEN * np.abs(np.log(sizes)).max(axis=0) + APART * np.abs(cells / n - 0.5)
         cost = np.where(possible, self._cut_areas(order) * np.exp(uneven), np.inf)
         chosen = int(np.argmax(cost <= (1.0 + ALIKE) * cost.min()))
-        return _Cut(order, chosen + 1, int(parts[chosen]), float(cost[chosen]))
+        return [_Cut(order, chosen + 1, int(parts[chosen]), float(cost[chosen]))]
 
     def _cut_areas(self, order: np.ndarray) -> np.ndarray:
         """Return the area of the faces between the first k cells and the others, k = 1 ... n - 1."""

@@ -28,6 +28,7 @@ import numpy as np
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import in_short
 from fenics_contact._base.files import Lock, hidden_folder, locked, replace_all
+from fenics_contact._base.launching import ranks_of
 from fenics_contact.errors import FenicsContactError, InvalidInputError, agree, together
 
 if TYPE_CHECKING:
@@ -157,7 +158,7 @@ def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> 
     """
     target = Path(path)
     with nullcontext() if comm is None else together(comm):
-        if comm is None or comm.rank == 0:
+        if ranks_of(comm).rank == 0:
             write_text(target, json_text(data))
     return target
 

@@ -249,30 +249,29 @@ def _check_topology(grid: Grid, path: Path) -> None:
         raise other_cells(f"grid '{grid.name}' of file '{path}'", grid.topology, _KNOWN)
 
 
-def chosen_grid(
+def chosen_grids(
     grids: Sequence[Grid],
     name: str | None,
     argument: str,
     suits: Callable[[Grid], bool],
     path: Path,
-    optional: bool = False,
-) -> Grid | None:
-    """Return the grid of a name, or the only suitable one."""
+) -> list[Grid]:
+    """Return the grid of a name, or the only suitable one, if there is any."""
     suitable = [grid for grid in grids if suits(grid) and name in (None, grid.name)]
     if len(suitable) == 1:
-        return suitable[0]
-    there = ", ".join(f"'{grid.name}' ({grid.topology})" for grid in grids) or "no grids at all"
+        return suitable
+    there = _listed(grids)
     if name is not None:
         raise InvalidInputError(f"file '{path}' has no grid for {argument}='{name}': it has {there}")
     if suitable:
         raise InvalidInputError(
             f"file '{path}' has several grids that could be {argument}: it has {there}; name one of them"
         )
-    if not optional:
-        raise InvalidInputError(
-            f"file '{path}' must have tetrahedra, hexahedra, triangles or quadrilaterals, it has {there}"
-        )
-    return None
+    return []
+
+
+def _listed(grids: Sequence[Grid]) -> str:
+    return ", ".join(f"'{grid.name}' ({grid.topology})" for grid in grids) or "no grids at all"
 
 
 Bodies = Sequence[Label] | Mapping[str, Label | Sequence[Label] | Mapping[str, Label]]
@@ -364,7 +363,8 @@ def from_dolfinx(
     from fenics_contact import _dolfinx
 
     arrays = _dolfinx.mesh_arrays(mesh)
-    tagged = _tagged_mesh(mesh, arrays, cell_tags, facet_tags, "mesh of dolfinx")
+    of_cells, of_facets = ([each for each in (tags,) if each is not None] for tags in (cell_tags, facet_tags))
+    tagged = _tagged_mesh(mesh, arrays, of_cells, of_facets, "mesh of dolfinx")
     made, cells = bodies_of(tagged, bodies, surfaces), cells_of_bodies(tagged, bodies)
     return DolfinxBodies(
         made, cells, {name: np.unique(arrays.cells[rows]) for name, rows in cells.items()}, arrays
@@ -376,17 +376,18 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
 
     grids = grids_of(path)
     others = grids if facet_path == path else grids_of(facet_path)
-    place = chosen_grid(grids, names[0], "mesh", lambda grid: grid.is_mesh, path)
-    assert place is not None
-    cells = chosen_grid(grids, names[1], "cell_tags", lambda grid: grid.tags_cells(place), path, True)
-    facets = chosen_grid(
-        others, names[2], "facet_tags", lambda grid: grid.tags_facets(place), facet_path, True
-    )
-
-    def tags(file: Path, grid: Grid | None) -> dolfinx.mesh.MeshTags | None:
-        return (
-            None if grid is None else _dolfinx.read_tags(file, mesh, grid.name, grid.inline, grid.has_points)
+    places = chosen_grids(grids, names[0], "mesh", lambda grid: grid.is_mesh, path)
+    if not places:
+        raise InvalidInputError(
+            f"file '{path}' must have tetrahedra, hexahedra, triangles or quadrilaterals, it has "
+            f"{_listed(grids)}"
         )
+    (place,) = places
+    cells = chosen_grids(grids, names[1], "cell_tags", lambda grid: grid.tags_cells(place), path)
+    facets = chosen_grids(others, names[2], "facet_tags", lambda grid: grid.tags_facets(place), facet_path)
+
+    def tags(file: Path, grids: Sequence[Grid]) -> list[dolfinx.mesh.MeshTags]:
+        return [_dolfinx.read_tags(file, mesh, each.name, each.inline, each.has_points) for each in grids]
 
     try:
         mesh = _dolfinx.read_mesh(path, place.name, place.inline)
@@ -401,8 +402,8 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
 def _tagged_mesh(
     mesh: dolfinx.mesh.Mesh,
     arrays: MeshArrays,
-    cell_tags: dolfinx.mesh.MeshTags | None,
-    facet_tags: dolfinx.mesh.MeshTags | None,
+    cell_tags: Sequence[dolfinx.mesh.MeshTags],
+    facet_tags: Sequence[dolfinx.mesh.MeshTags],
     source: str,
 ) -> TaggedMesh:
     from fenics_contact import _dolfinx
@@ -415,21 +416,22 @@ def _tagged_mesh(
     if arrays.dim == 2:
         points = flattened(points, np.unique(arrays.cells), source)
     cells = {arrays.cell_type: turned_right_handed(points, arrays.cells, source)}
-    groups = _groups(
-        arrays, None if cell_tags is None else _dolfinx.tag_arrays(mesh, arrays, cell_tags), source
-    )
+    groups = _groups(arrays, [_dolfinx.tag_arrays(mesh, arrays, tags) for tags in cell_tags], source)
     facets: dict[Label, list[np.ndarray]] = {}
-    if facet_tags is not None:
-        tagged = _dolfinx.tag_arrays(mesh, arrays, facet_tags)
+    for tags in facet_tags:
+        tagged = _dolfinx.tag_arrays(mesh, arrays, tags)
         facets = {int(tag): [tagged.entities[tagged.values == tag]] for tag in np.unique(tagged.values)}
     return TaggedMesh(source, points, cells, groups, facets, ("cell tag", "facet tag"))
 
 
-def _groups(arrays: MeshArrays, tagged: TagArrays | None, source: str) -> dict[Label, dict[str, np.ndarray]]:
+def _groups(
+    arrays: MeshArrays, every: Sequence[TagArrays], source: str
+) -> dict[Label, dict[str, np.ndarray]]:
     """Cells by tag; every cell has one, or all are "mesh"."""
     n_cells = arrays.cells.shape[0]
-    if tagged is None:
+    if not every:
         return {"mesh": {arrays.cell_type: np.arange(n_cells)}}
+    (tagged,) = every
     fits = np.isin(np.arange(n_cells), tagged.entities)
     check_each(fits, labelled("tag", source), "give the rest a tag of its own", "cell {}".format)
     return {

@@ -51,12 +51,12 @@ class Series:
     symbol: str
     connected: bool = True
 
-    def draw(self, axes: Any, x: list[float], y: list[float], label: str | None = None) -> None:
+    def draw(self, axes: Any, x: list[float], y: list[float], label: str) -> None:
         """Draw the series into axes with logarithmic scales or not."""
         axes.plot(
             x, y, linestyle="-" if self.connected else "none", marker=self.symbol, color=self.colour,
             lw=2.0, ms=8, markeredgecolor="white", markeredgewidth=0.6, zorder=3,
-            label=self.name if label is None else label,
+            label=label,
         )  # fmt: skip
 
 
@@ -182,7 +182,7 @@ def _draw_accuracy(axes: Any, errors: Errors, quantity: QuantityFacts) -> None:
     for series in series_of(errors):
         known = [(run.seconds_of(quantity), e) for run in series.runs if (e := errors.of(run, quantity.name))]
         if known:
-            series.draw(axes, [seconds for seconds, _ in known], [error for _, error in known])
+            series.draw(axes, [seconds for seconds, _ in known], [error for _, error in known], series.name)
             x += [seconds for seconds, _ in known]
             y += [error for _, error in known]
     front = pareto_front(x, y)

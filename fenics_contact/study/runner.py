@@ -74,13 +74,13 @@ def measure(job: Job, *, first: bool = True) -> Record:
         environment = _environment(job.threads)
         ending = finished(command, job.limit, environment=environment)
         record = _read(file)
-        if record is None and (ending.status or 0) > 0 and not ending.output + ending.errors:
+        if not record and (ending.status or 0) > 0 and not ending.output + ending.errors:
             # The start of MPI itself ends so, rarely; what a run raises is always printed. A signal, as for
             # want of memory, has a negative status and would end the run again.
             logger.warning("%s exited with status %d and printed nothing: once more", job.name, ending.status)
             ending = finished(command, job.limit, environment=environment)
             record = _read(file)
-    if not isinstance(record, dict):
+    if not record:
         record = {"failed": _failure(command, ending, job.limit)}
     return {**record, "load_average": load}
 
@@ -96,11 +96,13 @@ def _environment(threads: int | None) -> dict[str, str]:
     }
 
 
-def _read(file: Path) -> Any:
+def _read(file: Path) -> Record:
+    """Return the record of a file, an empty one if it is missing or holds none."""
     try:
-        return json.loads(file.read_text(encoding="utf-8"))
+        record = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return None
+        return {}
+    return record if isinstance(record, dict) else {}
 
 
 def _failure(command: list[str], ending: FinishedProcess, limit: float) -> dict[str, str]:
@@ -131,21 +133,21 @@ class Store:
         key = json.dumps(what, sort_keys=True).encode()
         return self.folder / f"{hashlib.sha256(key).hexdigest()[:16]}-{repeat}.json"
 
-    def read(self, job: Job, repeat: int) -> Record | None:
-        """Return a measurement or its failure, None if it is missing or damaged (logged)."""
+    def read(self, job: Job, repeat: int) -> Record:
+        """Return a measurement or its failure, an empty record if it is missing or damaged (logged)."""
         path = self.file(job, repeat)
         if not path.exists():
-            return None
+            return {}
         record = _read(path)
-        if not isinstance(record, dict) or "load_average" not in record:
+        if "load_average" not in record:
             logger.warning("%s holds no record of a run: it is done again", path)
-            return None
+            return {}
         return record
 
     def records(self, job: Job) -> list[Record]:
         """Return all measurements of a job, the first one first; empty if that is missing."""
         records = [self.read(job, repeat) for repeat in range(job.repeats)]
-        return [record for record in records if record is not None] if records[0] is not None else []
+        return [record for record in records if record] if records[0] else []
 
     def complete(self, job: Job) -> bool:
         """Return whether a job has all its measurements, without a failure."""
@@ -160,12 +162,10 @@ class Store:
     def missing(self, job: Job, repeat: int) -> bool:
         """Return whether a measurement is missing and needed, or failed in a way that may be transient."""
         record = self.read(job, repeat)
-        if record is not None:
+        if record:
             return "failed" in record and record["failed"]["kind"] in TRANSIENT
-        first = self.read(job, 0) if repeat else None
-        return not repeat or (
-            first is not None and "failed" not in first and first.get("seconds", 0.0) < job.short
-        )
+        first = self.read(job, 0) if repeat else {}
+        return not repeat or (bool(first) and "failed" not in first and first.get("seconds", 0.0) < job.short)
 
     def write(self, job: Job, repeat: int, record: Record) -> None:
         """Store a measurement; the file is written atomically."""

@@ -165,7 +165,7 @@ def test_a_store_keeps_what_a_run_was(tmp_path: Path) -> None:
     store.write(job, 0, {"seconds": 1.0, "load_average": 0.5})
     kept = json.loads(store.file(job, 0).read_text())
     assert (kept["name"], kept["arguments"], kept["code"]) == ("a", {"n": 1}, "mark")
-    assert store.read(job, 1) is None
+    assert store.read(job, 1) == {}
 
 
 def test_the_fingerprint_follows_the_code_that_is_measured(tmp_path: Path) -> None:
