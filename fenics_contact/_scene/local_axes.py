@@ -243,26 +243,26 @@ def _straighten(axes: np.ndarray, values: np.ndarray, straight: float = 1e-9) ->
     axes[whole] = own
 
 
-def flat_normal(mesh: BodyMesh, surface: str, flat: float = 1e-6) -> np.ndarray | None:
-    """Return the outward normal of a flat surface, shape (dim,), None of a curved one and of a node set.
+def flat_normals(mesh: BodyMesh, surface: str, flat: float = 1e-6) -> tuple[np.ndarray, ...]:
+    """Return the outward normal of a flat surface, shape (dim,), none of a curved one and of a node set.
 
     `flat`: distance of nodes from a plane, relative to the size of the surface, up to which it is flat:
     coordinates of files have few digits.
     """
     if surface in mesh.node_sets:
-        return None
+        return ()
     facets = mesh.surfaces[surface]
     areas = vector_areas(mesh.points, facets)
     total = areas.sum(axis=0)
     size = np.linalg.norm(areas, axis=1).sum()
     if np.linalg.norm(total) <= 0.5 * size:
-        return None
+        return ()
     normal = total / np.linalg.norm(total)
     points = mesh.points[np.unique(facets)]
     away = (points - points[0]) @ normal
     if np.ptp(away) > flat * np.linalg.norm(np.ptp(points, axis=0)) or (areas @ normal <= 0.0).any():
-        return None
-    return np.asarray(normal)
+        return ()
+    return (np.asarray(normal),)
 
 
 def widest_angle(mesh: BodyMesh, surface: str) -> float:

@@ -20,10 +20,10 @@ def held_directions(
 
     `mirrored`, `planes`: which nodes of the body lie on planes of symmetry, and their normals.
     """
-    direction = roller.direction_on(mesh)
-    if direction is not None:
+    along = roller.directions_on(mesh)
+    if along:
         nodes = mesh.nodes_to_hold(roller.surface)
-        directions = np.tile(direction, (len(nodes), 1))
+        directions = np.tile(along[0], (len(nodes), 1))
     elif callable(roller.direction):
         nodes = mesh.nodes_to_hold(roller.surface)
         directions = _given(roller, mesh.points[nodes])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -83,9 +82,3 @@ class SupportPart(Part):
     def reference(self, scene: Around) -> np.ndarray:
         """Return the point to which its reaction refers, shape (dim,): the centroid of its surface."""
         return centroid(scene, self.body, self.surface)
-
-
-def size_along(motion: Sequence[Any], normal: np.ndarray) -> float:
-    """Return the size of what a motion has along a direction, without what is free or a function."""
-    value = [0.0 if number is None or callable(number) else number for number in motion[: len(normal)]]
-    return abs(float(np.array(value) @ normal))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,9 +13,9 @@ from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.checks import check_entries, checked_point
 from fenics_contact._scene.effects import EffectName
 from fenics_contact._scene.fields import NodeValues, OfPosition, evaluate
-from fenics_contact._scene.local_axes import TILT, flat_normal, widest_angle
+from fenics_contact._scene.local_axes import TILT, flat_normals, widest_angle
 from fenics_contact._scene.part import Around, require_nodes, require_vector
-from fenics_contact._scene.support_part import SupportPart, size_along
+from fenics_contact._scene.support_part import SupportPart
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.kernels import motions_about
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -120,7 +120,8 @@ class Support(SupportPart):
 
     def motion_along(self, normal: np.ndarray, scene: Around) -> float:
         """Return the largest displacement along a direction that it prescribes by numbers, [length]."""
-        return size_along(self.value, normal)
+        numbers = [np.nan if callable(each) else each for each in self.value[: len(normal)]]
+        return abs(float(np.nan_to_num(np.array(numbers, dtype=np.float64)) @ normal))
 
     def symmetry(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
         """Return the axis of its only component, and the nodes of facets normal to it."""
@@ -197,45 +198,56 @@ class Roller(SupportPart):
                 f"Roller.displacement of surface {self.surface!r} of body {self.body!r} must be a finite "
                 f"number or a function of the points, got {given!r}: 0.0 holds the surface where it is"
             )
-        if self.direction is not None and not callable(self.direction):
+        for vector in self._vectors:
             name = f"Roller.direction of surface {self.surface!r} of body {self.body!r}"
-            dim = 2 if len(self.direction) == 2 else 3
-            object.__setattr__(self, "direction", unit_vector(name, self.direction, dim))
+            dim = 2 if len(vector) == 2 else 3
+            object.__setattr__(self, "direction", unit_vector(name, vector, dim))
 
     def check(self, scene: Around) -> None:
         """Reject nodes that are not there, and a direction that they do not have."""
         require_nodes(scene, self.body, self.surface, "Roller")
-        body, given = scene.bodies[self.body], self.direction
+        body = scene.bodies[self.body]
         mesh, where = body.mesh, f"{self.surface!r} of body {self.body!r}"
-        if self.surface in mesh.node_sets and given is None:
+        if self.surface in mesh.node_sets and self.is_along_normal:
             raise InvalidInputError(
                 f"a roller on nodes needs a direction, node set {where} has no normal: give one"
             )
-        if given is not None and not callable(given):
+        for vector in self._vectors:
             remedy = f"give {mesh.dim}, or none for the normal"
-            check_entries(f"Roller.direction of surface {where}", given, mesh.dim, remedy, "components")
-        if body.deforms_much and self.direction_on(mesh) is None:
+            check_entries(f"Roller.direction of surface {where}", vector, mesh.dim, remedy, "components")
+        if body.deforms_much and not self.directions_on(mesh):
             found = "is a function"
-            if given is None:
+            if self.is_along_normal:
                 found = f"turns by up to {widest_angle(mesh, self.surface):.3g} degrees, as it is curved"
             raise InvalidInputError(
                 f"a Roller on a body that deforms much needs one direction, that of {where} {found}: give a "
                 "vector, or hold the surface by a RigidObstacle and contact"
             )
 
-    def direction_on(self, mesh: BodyMesh) -> np.ndarray | None:
-        """Return the one direction along which it holds its nodes, shape (dim,); None where they differ."""
-        if callable(self.direction):
-            return None
-        return flat_normal(mesh, self.surface) if self.direction is None else np.array(self.direction)
+    @property
+    def is_along_normal(self) -> bool:
+        """Whether it holds its nodes along the normals of its surface."""
+        return self.direction is None
+
+    @property
+    def _vectors(self) -> tuple[GivenVector, ...]:
+        """Its direction, if that is a vector."""
+        along = self.is_along_normal or callable(self.direction)
+        return () if along else (cast("GivenVector", self.direction),)
+
+    def directions_on(self, mesh: BodyMesh) -> tuple[np.ndarray, ...]:
+        """Return the one direction along which it holds its nodes, (dim,); nothing where they differ."""
+        if self.is_along_normal:
+            return flat_normals(mesh, self.surface)
+        return tuple(np.array(vector) for vector in self._vectors)
 
     @property
     def in_words(self) -> str:
         """Where it is and what it prescribes."""
         amount = "function" if callable(self.displacement) else f"{self.displacement:g}"
-        along = "the normal" if self.direction is None else "a function"
-        if self.direction is not None and not callable(self.direction):
-            along = f"({', '.join(f'{part:.4g}' for part in self.direction)})"
+        along = "the normal" if self.is_along_normal else "a function"
+        for vector in self._vectors:
+            along = f"({', '.join(f'{part:.4g}' for part in vector)})"
         return f"{self.body} {self.surface} slides, {amount} along {along}"
 
     @property
@@ -272,20 +284,22 @@ class Roller(SupportPart):
 
     def motion_along(self, normal: np.ndarray, scene: Around) -> float:
         """Return the displacement along a direction that it prescribes by one number, [length]."""
-        along = self.direction_on(scene.bodies[self.body].mesh)
-        if along is None or callable(self.displacement):
+        if callable(self.displacement):
             return 0.0
-        return abs(self.displacement * float(along @ normal))
+        along = self.directions_on(scene.bodies[self.body].mesh)
+        return sum(abs(self.displacement * float(each @ normal)) for each in along)
 
     def symmetry(self, scene: Around) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
         """Return the normal and the nodes of the flat side that it holds across, if it is one of symmetry."""
         mesh = scene.bodies[self.body].mesh
-        normal, along = flat_normal(mesh, self.surface), self.direction_on(mesh)
-        if normal is None or along is None or callable(self.displacement):
+        if callable(self.displacement):
             return ()
-        if abs(along @ normal) < 1.0 - TILT or not scene.kinematics.is_mirrored(normal, TILT):
-            return ()
-        return ((normal, mesh.surfaces[self.surface].ravel()),)
+        return tuple(
+            (normal, mesh.surfaces[self.surface].ravel())
+            for normal in flat_normals(mesh, self.surface)
+            for along in self.directions_on(mesh)
+            if abs(along @ normal) >= 1.0 - TILT and scene.kinematics.is_mirrored(normal, TILT)
+        )
 
     def amounts(self, points: np.ndarray) -> np.ndarray:
         """Return the prescribed displacement at points, shape (n, dim), along the direction there, (n,).
@@ -377,18 +391,16 @@ class RigidSurface(SupportPart):
 
         With torsion it also turns about the axis: rotation and moment are those about it.
         """
-        radial, turned = (self.displacement or (None,))[0], self.rotation
+        radial, along, *turned = self.motion
         if torsion and self.dim == 2 and not (radial or self.load[0]):
-            moved = (0.0, self.displacement[1] if self.displacement is not None else None)
             given = {each.name: getattr(self, each.name) for each in fields(RigidSurface)}
-            return TurningSurface(**{**given, "displacement": moved})
-        if torsion or self.dim != 2 or radial or turned or self.load[0] or self.load[2]:
+            return TurningSurface(**{**given, "displacement": (0.0, along)})
+        if torsion or self.dim != 2 or radial or any(turned) or self.load[0] or self.load[2]:
             ways = "and turn about it alone" if torsion else "alone"
             raise InvalidInputError(
                 f"RigidSurface on {self._whose} of revolution can move along the axis {ways}, got force "
                 f"{self.force!r}, moment {self.moment!r} {self._prescribes}: give (0.0, w) or force=(0.0, F)"
             )
-        along = self.displacement[1] if self.displacement is not None else None
         return replace(self, displacement=(0.0, along), rotation=0.0)
 
     def _checked(self, name: str, count: int) -> Motion | float | None:
@@ -435,26 +447,35 @@ class RigidSurface(SupportPart):
     @property
     def motion(self) -> Motion:
         """Components of U, then of θ, None where free."""
-        moved = (None,) * self.dim if self.displacement is None else self.displacement
-        turned = (None,) * self.turns if self.rotation is None else self.rotation
-        return (*moved, *(turned if isinstance(turned, tuple) else (turned,)))
+        return (*self._components("displacement", self.dim), *self._components("rotation", self.turns))
+
+    def _components(self, name: str, count: int) -> Motion:
+        """Return the components of an attribute, None where it gives nothing."""
+        given = getattr(self, name)
+        if given is None:
+            return (None,) * count
+        return given if isinstance(given, tuple) else (given,)
 
     @property
     def free(self) -> np.ndarray:
         """Marks of the free components of U, then of θ, shape (3,) in the plane, (6,) in space."""
-        return np.array([component is None for component in self.motion])
+        return np.isnan(self._numbers)
+
+    @property
+    def _numbers(self) -> np.ndarray:
+        """Components of U, then of θ, NaN where free, shape (3,) in the plane, (6,) in space."""
+        return np.array(self.motion, dtype=np.float64)
 
     @property
     def load(self) -> np.ndarray:
         """Force and moment at the point, zero by default, shape (3,) in the plane, (6,) in space."""
-        force = np.zeros(self.dim) if self.force is None else np.asarray(self.force, dtype=np.float64)
-        moment = np.zeros(self.turns) if self.moment is None else np.atleast_1d(self.moment)
-        return np.concatenate([force, moment])
+        given = *self._components("force", self.dim), *self._components("moment", self.turns)
+        return np.nan_to_num(np.array(given, dtype=np.float64))
 
     @property
     def in_words(self) -> str:
         """Where it is and what it prescribes."""
-        given = ["free" if v is None else f"{v:g}" for v in self.motion]
+        given = ["free" if np.isnan(v) else f"{v:g}" for v in self._numbers]
         moved, turned = ", ".join(given[: self.dim]), ", ".join(given[self.dim :])
         return f"{self.body} {self.surface} as rigid: displacement ({moved}), rotation ({turned})"
 
@@ -474,7 +495,7 @@ class RigidSurface(SupportPart):
 
     def motion_along(self, normal: np.ndarray, scene: Around) -> float:
         """Return the displacement of its point along a direction that it prescribes, [length]."""
-        return size_along(self.motion, normal)
+        return abs(float(self.prescribed[: len(normal)] @ normal))
 
     def reference(self, scene: Around) -> np.ndarray:
         """Return the point to which its reaction refers, shape (dim,)."""
@@ -511,7 +532,7 @@ class RigidSurface(SupportPart):
     @property
     def prescribed(self) -> np.ndarray:
         """U, then θ, zero where free, shape (3,) in the plane, (6,) in space."""
-        return np.array([0.0 if component is None else component for component in self.motion])
+        return np.nan_to_num(self._numbers)
 
     def values(self, points: np.ndarray) -> np.ndarray:
         """Return the displacement of points, both of shape (n, dim), with zero for free components."""
@@ -606,8 +627,6 @@ class ToolMotion(SupportPart):
 
     def springs(self, at: GivenVector) -> GivenVector:
         """Return the stiffness of the springs along and around all axes, () without any."""
-        if self.stiffness is None and self.rotational_stiffness is None:
-            return ()
         turns = 2 * len(at) - 3
         parts = [self.stiffness, self.rotational_stiffness]
         rows = [
