@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from inspect import signature
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -79,8 +79,8 @@ class Body:
             )
         if self.axisymmetric:
             _check_half_section(self.mesh)
-        if isinstance(self.material, Mapping):
-            _check_regions(self.mesh, self.material)
+        if self._by_region:
+            _check_regions(self.mesh, self._by_region)
         for material in self.materials:
             _check_material(material, self.kinematics)
         known = [thickness_of(each) for each in self.materials]
@@ -96,13 +96,18 @@ class Body:
     @property
     def materials(self) -> tuple[Material, ...]:
         """The different materials, in the order of the regions."""
-        if not isinstance(self.material, Mapping):
-            return (self.material,)
+        if not self._by_region:
+            return (cast("Material", self.material),)
         different: list[Material] = []
         for region in self.mesh.regions:
-            if self.material[region] not in different:
-                different.append(self.material[region])
+            if self._by_region[region] not in different:
+                different.append(self._by_region[region])
         return tuple(different)
+
+    @property
+    def _by_region(self) -> Mapping[str, Material]:
+        """The material of each region, empty if there is one for all."""
+        return self.material if isinstance(self.material, Mapping) else {}
 
     @property
     def kinematics(self) -> Kinematics:
@@ -154,9 +159,9 @@ class Body:
         """Its volume, of a plane body the area, [length³] or [length²]."""
         return self.volume_of()
 
-    def volume_of(self, region: str | None = None) -> float:
+    def volume_of(self, region: str = "") -> float:
         """Return the volume of a region of its mesh, by default of all of it, see `volume`."""
-        cells = self.mesh.cells if region is None else self.mesh.cells[self.mesh.regions[region]]
+        cells = self.mesh.cells[self.mesh.regions[region]] if region else self.mesh.cells
         return self.kinematics.volume(self.mesh, cells)
 
     @property
@@ -195,10 +200,9 @@ class Body:
     def material_of_cells(self) -> np.ndarray:
         """Number of each cell's material in `materials`, shape (n_cells,)."""
         number = np.zeros(self.mesh.n_cells, dtype=np.int64)
-        if isinstance(self.material, Mapping):
-            materials = self.materials
-            for region, cells in self.mesh.regions.items():
-                number[cells] = materials.index(self.material[region])
+        materials = self.materials
+        for region, material in self._by_region.items():
+            number[self.mesh.regions[region]] = materials.index(material)
         return number
 
 
@@ -275,8 +279,8 @@ def _check_material(material: Material, kinematics: Kinematics) -> None:
 
 def _check_symmetric_axes(material: Material, rounding: float = 1e-9) -> None:
     """Refuse stiffness that would twist a body: shear around the circumference under other strains."""
-    stiffness = getattr(material, "stiffness_matrix", None)
-    if stiffness is not None and np.shape(stiffness) == (6, 6):
+    stiffness: Any = getattr(material, "stiffness_matrix", None)
+    if np.shape(stiffness) == (6, 6):
         coupling = np.abs(stiffness[np.ix_([0, 1, 2, 5], [3, 4])]).max()
         if coupling > rounding * np.abs(stiffness).max():
             raise InvalidInputError(

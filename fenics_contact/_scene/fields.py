@@ -337,8 +337,8 @@ def _table(path: Path) -> dict[str, np.ndarray]:
         raise InvalidInputError(f"the field '{path}' must be readable text: {error}") from error
     while len(lines) > 1 and lines[0].startswith("#") and lines[1].lstrip()[0] not in "+-.0123456789":
         del lines[0]  # a remark before the line of names
-    mark = next((mark for mark in ",;\t" if lines and mark in lines[0]), None)
-    rows = [line.split() for line in lines] if mark is None else list(csv.reader(lines, delimiter=mark))
+    mark = next((mark for mark in ",;\t" if lines and mark in lines[0]), "")
+    rows = list(csv.reader(lines, delimiter=mark)) if mark else [line.split() for line in lines]
     names = [name.strip().lstrip("#").strip() for name in rows[0]] if rows else []
     named = [name.lower() if name.lower() in AXES else name for name in names]
     if not {"x", "y"} <= set(named) or len(set(named)) < len(named):
@@ -351,9 +351,9 @@ def _table(path: Path) -> dict[str, np.ndarray]:
 
 def _numbers(path: Path, rows: Sequence[Sequence[str]], count: int) -> np.ndarray:
     """Return the rows of a table as numbers, shape (n, count)."""
-    uneven = next((number for number, row in enumerate(rows) if len(row) != count), None)
-    if uneven is not None or not rows:
-        got = "no rows" if uneven is None else f"{len(rows[uneven])} in row {uneven + 1}"
+    uneven = [f"{len(row)} in row {number}" for number, row in enumerate(rows, 1) if len(row) != count]
+    if uneven or not rows:
+        got = uneven[0] if uneven else "no rows"
         raise InvalidInputError(
             f"every row of '{path}' must have {count} entries, as its first line has, got {got}: complete it"
         )
@@ -383,9 +383,12 @@ def _chosen(
     path: Path, columns: Mapping[str, np.ndarray], field: str | Sequence[str] | None
 ) -> tuple[str, ...]:
     """Return the names of the columns that make the field."""
-    wanted = (field,) if isinstance(field, str) else tuple(columns if field is None else field)
-    if not wanted or not set(wanted) <= set(columns) or (field is None and len(columns) > 1):
-        asked = "none was named" if field is None else f"{', '.join(wanted)} was asked for"
+    if field is None:
+        wanted, asked, most = tuple(columns), "none was named", 1
+    else:
+        wanted, most = (field,) if isinstance(field, str) else tuple(field), len(columns)
+        asked = f"{', '.join(wanted)} was asked for"
+    if not wanted or not set(wanted) <= set(columns) or len(columns) > most:
         raise InvalidInputError(
             f"'{path}' must have the field that is wanted, it has {', '.join(columns) or 'none'}, and "
             f"{asked}: give field, one of these names, or several for a vector"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, Self, cast
 
 import numpy as np
 
@@ -60,6 +62,10 @@ class LoadPart(Part):
         """What acts where."""
         return f"{type(self).__name__} {self.body}"
 
+    def in_regions(self, regions: Iterable[str]) -> tuple[Self, ...]:
+        """Return it region by region, if it acts on the volume of all of its body."""
+        return (self,)
+
     def width(self, components: int) -> tuple[int, ...]:
         """Return the shape of its value at a point of a body with so many components of displacement."""
         return () if self.is_scalar else (components,)
@@ -94,6 +100,25 @@ class LoadPart(Part):
     def following(self, scene: Around) -> tuple[Any, ...]:
         """Return the load if it follows its surface."""
         return ()
+
+
+class RegionLoad(LoadPart):
+    """What acts on the volume of a body, or of a region of it.
+
+    Attributes:
+        region: Name of the region of the mesh of its body.
+    """
+
+    region: str | None
+
+    @property
+    def on_region(self) -> str:
+        """Name of the region of its body on which alone it acts, empty if there is none."""
+        return self.region or ""
+
+    def in_regions(self, regions: Iterable[str]) -> tuple[Self, ...]:
+        """Return it region by region, if it acts on all of its body."""
+        return (self,) if self.on_region else tuple(replace(self, region=each) for each in regions)  # type: ignore[type-var]
 
 
 class SurfaceLoad(LoadPart):

@@ -28,7 +28,7 @@ from fenics_contact._scene.fields import (
     evaluate,
     numbers_of_vector,
 )
-from fenics_contact._scene.load_part import LoadPart, SurfaceLoad
+from fenics_contact._scene.load_part import LoadPart, RegionLoad, SurfaceLoad
 from fenics_contact._scene.part import Around, body_of, require_nodes, require_surface, require_vector
 from fenics_contact._surfaces.facets import gauss_points, quadrature_areas
 from fenics_contact.errors import InvalidInputError
@@ -207,7 +207,7 @@ class Pressure(SurfaceLoad):
 
 @dataclass(frozen=True)
 @checked("value")
-class BodyForce(LoadPart):
+class BodyForce(RegionLoad):
     """Dead load on the volume; for weight see `gravity`.
 
     Attributes:
@@ -228,26 +228,26 @@ class BodyForce(LoadPart):
 
     def _total(self, body: Body, value: np.ndarray) -> np.ndarray:
         """Return the resultant of a value."""
-        return value * body.volume_of(self.region)
-
-    @property
-    def on_region(self) -> str:
-        """Name of the region of its body on which alone it acts, empty if there is none."""
-        return self.region or ""
+        return value * body.volume_of(self.on_region)
 
     def check(self, scene: Around) -> None:
         """Reject a vector of another space, an unknown region and an axis that the body does not have."""
         of = body_of(scene, self.body, "BodyForce").kinematics
         require_vector(self.value, of.components, of.vector_in_words, "BodyForce", self.body)
         require_region(self, scene.bodies[self.body].mesh)
-        if isinstance(self.value, Spinning):
-            self.value.require_axis(scene.kinematics)
+        for spinning in self._spinning:
+            spinning.require_axis(scene.kinematics)
+
+    @property
+    def _spinning(self) -> tuple[Spinning, ...]:
+        """Its value, if it is a centrifugal force."""
+        return (self.value,) if isinstance(self.value, Spinning) else ()
 
     def in_scene(self, scene: Around) -> BodyForce:
         """Return the load with as many components as its body has; what spins has nothing around the axis."""
         of = scene.kinematics
-        if of.components > of.dim and isinstance(self.value, Spinning):
-            return replace(self, value=replace(self.value, components=of.components))
+        if of.components > of.dim and self._spinning:
+            return replace(self, value=replace(*self._spinning, components=of.components))
         return self
 
 
@@ -305,7 +305,7 @@ class ThermalStrain(LoadPart):
 
 @dataclass(frozen=True)
 @checked("value")
-class InitialStress(LoadPart):
+class InitialStress(RegionLoad):
     """A stress that a body has before anything loads or moves it: of welding, rolling, an earlier process.
 
     The body relaxes it as far as its supports let it: σ = σ₀ + C : ε(u), and the work of σ₀ is
@@ -352,11 +352,6 @@ class InitialStress(LoadPart):
         """Return the shape of its value at a point: six numbers."""
         return (6,)
 
-    @property
-    def on_region(self) -> str:
-        """Name of the region of its body on which alone it acts, empty if there is none."""
-        return self.region or ""
-
     def check(self, scene: Around) -> None:
         """Reject nonlinear materials, an unknown region and numbers for components that are zero."""
         body = body_of(scene, self.body, "InitialStress")
@@ -389,7 +384,7 @@ class InitialStress(LoadPart):
             InvalidInputError: If a function does not return six finite numbers per point, or components
                 are not zero that plane bodies do not have.
         """
-        where = np.arange(mesh.n_cells) if self.region is None else mesh.regions[self.region]
+        where = mesh.regions[self.on_region] if self.on_region else np.arange(mesh.n_cells)
         found = np.zeros((mesh.n_cells, 6))
         if callable(self.value):
             centres = mesh.points[mesh.cells[where]].mean(axis=1)
@@ -473,9 +468,9 @@ def _refuse_ufl(name: str, value: object) -> None:
 
 def require_region(load: BodyForce | InitialStress, mesh: BodyMesh) -> None:
     """Reject a region that a mesh does not have."""
-    if load.on_region:
-        words = f"{type(load).__name__} names region {load.on_region!r} of body {load.body!r}, whose mesh has"
-        check_known(load.on_region, mesh.regions, words, "use one of them, or none for the whole body")
+    if load.region is not None:
+        words = f"{type(load).__name__} names region {load.region!r} of body {load.body!r}, whose mesh has"
+        check_known(load.region, mesh.regions, words, "use one of them, or none for the whole body")
 
 
 def initial_stress(loads: Iterable[InitialStress], body: Body) -> np.ndarray:
@@ -579,9 +574,10 @@ def centrifugal(
             "a centrifugal force needs finite numbers and the coordinates of a point, got density "
             f"{density!r}, speed {speed!r} and point {point!r}: give them"
         )
-    if axis is None and len(point) == 3:
-        axis = (0.0, 0.0, 1.0)
-    along = None if axis is None else unit_vector("the axis of a centrifugal force", axis, len(point))
+    if axis is None:
+        along: GivenVector | None = (0.0, 0.0, 1.0) if len(point) == 3 else None
+    else:
+        along = unit_vector("the axis of a centrifugal force", axis, len(point))
     return BodyForce(body, Spinning(float(density), float(speed), floats(np.asarray(point)), along), region)
 
 

@@ -156,13 +156,13 @@ class Fit:
     """Memory that a state of a linear scene takes on a machine, and what the machine has left, [bytes].
 
     Attributes:
-        left: What may be taken; None where it is not known, or the scene is too small to matter.
+        left: What may be taken, infinite where it is not known, or the scene is too small to matter.
         fast: What a state takes where subdomains are stored for speed.
         compact: That where each is stored as one triangle in single precision, `LocalKind.COMPACT`.
         roomy: Share of the memory that may be taken.
     """
 
-    left: float | None = None
+    left: float = np.inf
     fast: float = 0.0
     compact: float = 0.0
     roomy: float = 0.9
@@ -170,12 +170,12 @@ class Fit:
     @property
     def is_tight(self) -> bool:
         """Whether subdomains are to be stored compactly."""
-        return self.left is not None and self.fast > self.roomy * self.left
+        return self.fast > self.roomy * self.left
 
     @property
     def is_tighter(self) -> bool:
         """Whether bodies are to be cut for subdomains that are stored compactly."""
-        return self.left is not None and min(self.fast, self.compact) > self.roomy * self.left
+        return min(self.fast, self.compact) > self.roomy * self.left
 
     @classmethod
     def of(
@@ -204,16 +204,15 @@ class Fit:
             fast = expected_memory(scene, parts, comm.size)
             compact = expected_memory(scene, parts, comm.size, compact=True)
             left = limit or _left(ranks)
-        each = comm.allgather((np.inf if left is None else left / share, left, share))
+        each = comm.allgather((left / share, left, share))
         _, left, share = min(each, key=lambda one: one[0])
         return cls(left, share * fast, share * compact)
 
 
-def _left(ranks: int) -> float | None:
-    """Return what a machine has left for its ranks, each of which may have a limit of its own, [bytes]."""
-    own = addressable_memory()
-    known = [available_memory(), None if own is None else ranks * own]
-    return min((size for size in known if size is not None), default=None)
+def _left(ranks: int) -> float:
+    """Return what a machine has left for its ranks, infinite if unknown, [bytes]; ranks may have limits."""
+    known = (available_memory(), 1), (addressable_memory(), ranks)
+    return min((count * size for size, count in known if size is not None), default=np.inf)
 
 
 def require_memory(
@@ -233,7 +232,7 @@ def require_memory(
     """
     fit, unknowns = Fit.of(scene, partitions, comm, limit=limit), _unknowns(scene)
     needed = min(fit.fast, fit.compact)
-    if fit.left is not None and needed > certain * fit.left:
+    if needed > certain * fit.left:
         left = f"{fit.left / 1e9:.3g} GB {'are left' if limit is None else 'are allowed'}"
         raise InvalidInputError(
             f"a state must fit into memory, but {unknowns} unknowns need about {needed / 1e9:.3g} GB on this "

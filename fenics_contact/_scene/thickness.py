@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.checks import check_alike
 from fenics_contact._scene.foundations import ElasticFoundation
-from fenics_contact._scene.loads import BodyForce, InitialStress, Load
+from fenics_contact._scene.loads import Load
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import InvalidInputError
@@ -65,7 +64,4 @@ def by_thickness(loads: Sequence[Load], bodies: Mapping[str, Body]) -> Iterator[
     for load in loads:
         body = bodies[load.body]
         several = body.has_thickness and len(body.materials) > 1
-        if isinstance(load, BodyForce | InitialStress) and load.region is None and several:
-            yield from (replace(load, region=region) for region in body.mesh.regions)
-        else:
-            yield load
+        yield from load.in_regions(body.mesh.regions) if several else (load,)
