@@ -57,20 +57,20 @@ class ConstraintTerm:
         """Make arrays, and reject those that do not fit."""
         if not self.set_name:
             self._set("nodes", self._array("nodes", np.int64, (1,)))
-        if not (isinstance(self.direction, str) and self.direction in _AXES):
+        if self.axis not in _AXES:
             given = self._array("direction", np.float64, (1, 2))
             self._set("direction", given if given.ndim == 2 else floats(given))
         factor = self._array("factor", np.float64, (0, 1))
         self._set("factor", factor if factor.ndim else float(factor))
-        if self.equation is not None:
+        if not self.is_by_node:
             number = self._array("equation", np.int64, (0, 1))
             if (number < 0).any():
                 raise InvalidInputError(
                     f"ConstraintTerm.equation must count from 0, got {brief(self.equation)}"
                 )
             self._set("equation", number if number.ndim else int(number))
-        for name in ("direction", "factor"):
-            if not isinstance(getattr(self, name), str) and not np.any(getattr(self, name)):
+        for name in ("factor",) if self.axis else ("direction", "factor"):
+            if not np.any(getattr(self, name)):
                 raise InvalidInputError(f"ConstraintTerm.{name} must not be zero: leave the term out")
         sizes = {len(each) for each in self._by_node}
         if len(sizes) > 1:
@@ -83,6 +83,22 @@ class ConstraintTerm:
     def set_name(self) -> str:
         """Name of its nodes, empty if they are given by numbers."""
         return self.nodes if isinstance(self.nodes, str) else ""
+
+    @property
+    def axis(self) -> str:
+        """Name of the axis along which it acts, empty if it has vectors."""
+        return self.direction if isinstance(self.direction, str) else ""
+
+    @property
+    def is_by_node(self) -> bool:
+        """Whether each of its nodes has an equation of its own."""
+        return self.equation is None
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """Number of the equation of all its nodes, shape (), or of each, (n,); nothing if it is by node."""
+        given: Any = () if self.is_by_node else self.equation
+        return np.asarray(given, dtype=np.int64)
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -134,8 +150,8 @@ class ConstraintTerm:
 
     def vectors(self, count: int, dim: int) -> np.ndarray:
         """Return c d of its nodes, shape (count, dim)."""
-        if isinstance(self.direction, str):
-            along = np.eye(3)[_AXES.index(self.direction), :dim]
+        if self.axis:
+            along = np.eye(3)[_AXES.index(self.axis), :dim]
         else:
             along = np.asarray(self.direction)
         return np.broadcast_to(np.asarray(self.factor).reshape(-1, 1) * along, (count, dim))
@@ -224,26 +240,24 @@ class LinearConstraint(Part):
             InvalidInputError: If terms do not fit each other or their bodies.
         """
         found = [self._nodes(term, bodies[term.body].mesh) for term in self.terms]
-        several = {
-            len(n) for t, n in zip(self.terms, found, strict=True) if t.equation is None and len(n) > 1
-        }
+        several = {len(n) for t, n in zip(self.terms, found, strict=True) if t.is_by_node and len(n) > 1}
         if len(several) > 1:
             raise InvalidInputError(
                 f"terms of LinearConstraint {self.label!r} must have as many nodes as each other, or one, "
                 f"got {' and '.join(map(str, sorted(several)))}: give sets of as many, or equations"
             )
-        numbers = [int(np.max(t.equation)) + 1 for t in self.terms if t.equation is not None]
+        numbers = [int(t.numbers.max()) + 1 for t in self.terms if not t.is_by_node]
         count = max([1, *several, *numbers])
         first = next((k for k, n in enumerate(found) if len(n) > 1), 0)
         entries = []
         for number, (term, nodes) in enumerate(zip(self.terms, found, strict=True)):
-            if self.paired == "translation" and number > first and len(nodes) > 1 and term.equation is None:
+            if self.paired == "translation" and number > first and len(nodes) > 1 and term.is_by_node:
                 start = bodies[self.terms[first].body].mesh.points[found[first]]
                 nodes = nodes[self._partners(start, bodies[term.body].mesh.points[nodes])]
-            if term.equation is not None:
-                equation = np.broadcast_to(np.asarray(term.equation, dtype=np.int64), nodes.shape)
-            else:
+            if term.is_by_node:
                 equation = np.arange(count if len(nodes) == 1 else len(nodes))
+            else:
+                equation = np.broadcast_to(term.numbers, nodes.shape)
             vectors = term.vectors(len(nodes), bodies[term.body].mesh.dim)
             if len(nodes) == 1 and len(equation) > 1:
                 nodes, vectors = np.repeat(nodes, len(equation)), np.repeat(vectors, len(equation), axis=0)
@@ -267,7 +281,7 @@ class LinearConstraint(Part):
                 f"arrays of the term {term.in_words!r} must have one entry for each of its {len(nodes)} "
                 f"nodes, got {[len(each) for each in term._by_node]}"
             )
-        given = _AXES.index(term.direction) + 1 if isinstance(term.direction, str) else 0
+        given = _AXES.index(term.axis) + 1 if term.axis else 0
         width = dim if given else np.shape(term.direction)[-1]
         if given > dim or width != dim:
             raise InvalidInputError(
@@ -336,11 +350,9 @@ def require_refinable(constraints: Sequence[LinearConstraint], bodies: Mapping[s
     """Reject constraints whose nodes would have other numbers, or another order, on finer meshes."""
     for each in constraints:
         several = [
-            term
-            for term in each.terms
-            if term.equation is None and len(term.nodes_of(bodies[term.body].mesh)) > 1
+            term for term in each.terms if term.is_by_node and len(term.nodes_of(bodies[term.body].mesh)) > 1
         ]
-        arrays = any(isinstance(part, np.ndarray) for t in each.terms for part in (t.nodes, *t._by_node))
+        arrays = any(term._by_node for term in each.terms)
         if arrays or (each.paired == "order" and len(several) > 1):
             raise InvalidInputError(
                 f"meshes with LinearConstraint {each.label!r} cannot be refined, as numbers and order of "

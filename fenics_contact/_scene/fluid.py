@@ -63,7 +63,7 @@ class FluidPressure:
     @property
     def opens_at(self) -> float:
         """The contact pressure up to which a point counts as open, [force / length²]."""
-        return self.pressure if isinstance(self.critical, str) else self.critical
+        return self.pressure if self.critical == "pressure" else self.critical
 
     def inlet(self, points: np.ndarray, shared: np.ndarray) -> np.ndarray:
         """Return which slave nodes are at the inlet, shape (n,).

@@ -81,8 +81,7 @@ class MovingObstacle:
     @property
     def dim(self) -> int:
         """Dimension of the space in which it moves: that of the obstacle, else of its path."""
-        known = getattr(self.obstacle, "dim", None)
-        return len(self.frame(0.0)[1]) if known is None else int(known)
+        return int(getattr(self.obstacle, "dim", 0)) or len(self.frame(0.0)[1])
 
     def frame(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return rotation, shape (dim, dim), and translation, shape (dim,), at a time.

@@ -68,28 +68,28 @@ def modulus_of(scene: SceneParts, pair: ContactPair) -> float | None:
     sides = [_constants(scene.bodies[pair.slave.body]), (np.inf, 0.0)]
     for master in pair.surfaces[1:]:
         sides[1] = _constants(scene.bodies[master.body])
-    if None in sides:
+    if not all(sides):
         return None
-    (young_1, poisson_1), (young_2, poisson_2) = sides  # type: ignore[misc]
+    (young_1, poisson_1), (young_2, poisson_2) = sides
     return contact_modulus(young_1, poisson_1, young_2, poisson_2)
 
 
 def master_share(scene: SceneParts, pair: ContactPair | AnyTie) -> float:
     """Return the master's share of the compliance 1/E* of two bodies; a half where one is not isotropic."""
-    own, other = (_constants(scene.bodies[surface.body]) for surface in pair.surfaces)
-    if own is None or other is None:
+    sides = [_constants(scene.bodies[surface.body]) for surface in pair.surfaces]
+    if not all(sides):
         return 0.5
-    moduli = [contact_modulus(*constants, np.inf, 0.0) for constants in (own, other)]
+    moduli = [contact_modulus(young, poisson, np.inf, 0.0) for young, poisson in sides]
     return moduli[0] / sum(moduli)
 
 
-def _constants(body: Body) -> tuple[float, float] | None:
-    """Return Young's modulus and Poisson's ratio, the latter 0 where a thin slice strains freely."""
+def _constants(body: Body) -> tuple[float, ...]:
+    """Return Young's modulus and Poisson's ratio, 0 of a free thin slice; nothing if not isotropic."""
     constants = []
     for material in body.materials:
         found = isotropic_constants(material)
         if found is None:
-            return None
+            return ()
         constants.append((found[0], 0.0 if isinstance(material, PlaneStress) else found[1]))
     return min(constants)
 
@@ -492,16 +492,16 @@ def unpaired(
         before, wall = scene.bodies[body].mesh.points, scene.bodies[into].mesh.points
         facets, behind, _ = outlines[body]
         by_name = np.all(np.isin(facets, named[body]), axis=1)
-        own, mine = facets[by_name], np.flatnonzero(~by_name)[share]
+        own, mine = (facets[by_name], behind[by_name]), np.flatnonzero(~by_name)[share]
         facets, behind, inside = facets[mine], behind[mine], outlines[into][2]
         size = np.ptp(before[facets], axis=1).max(axis=1)
         here, there = _Facets.of(before, facets, behind), _Facets.of(before + moved[body], facets, behind)
         passed = wall + moved[into]
         touching = here.within(TOUCHING * size, wall, inside)
         overlapping = here.within(-OVERLAPPING * size, wall, inside)
-        overlapping &= ~here.follow(_Facets.of(before, own), overlapping, wall, inside)
+        overlapping &= ~here.follow(_Facets.of(before, *own), overlapping, wall, inside)
         entered = there.within(-deep, passed, inside) & ~here.within(-deep, wall, inside)
-        entered &= ~there.follow(_Facets.of(before + moved[body], own), entered, passed, inside)
+        entered &= ~there.follow(_Facets.of(before + moved[body], *own), entered, passed, inside)
         counts += [np.count_nonzero(each) for each in (touching, overlapping, entered)]
     return Unpaired(both, any(len(nodes) for nodes in named.values()), tuple(counts.tolist()))
 
@@ -549,12 +549,12 @@ class _Facets:
     depth: np.ndarray
 
     @classmethod
-    def of(cls, points: np.ndarray, facets: np.ndarray, cells: np.ndarray | None = None) -> _Facets:
+    def of(cls, points: np.ndarray, facets: np.ndarray, cells: np.ndarray) -> _Facets:
         """Return facets, with the cells behind them, given by their nodes."""
         area = vector_areas(points, facets)
         normal = area / np.linalg.norm(area, axis=1)[:, None]
         middle = points[corners_of(facets, points.shape[1])].mean(axis=1)
-        inner = middle if cells is None else points[cells].mean(axis=1)
+        inner = points[cells].mean(axis=1)
         return cls(middle, normal, np.einsum("nd,nd->n", middle - inner, normal))
 
     def within(self, out: np.ndarray | float, wall: np.ndarray, simplices: np.ndarray) -> np.ndarray:

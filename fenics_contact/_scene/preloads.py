@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -61,11 +62,15 @@ class Section:
         if self.region is not None:
             cells = cells_of_region(mesh, body, self.region)
         arms = mesh.points[mesh.cells[cells]].mean(axis=1) - np.array(self.point)
-        if self.radius is not None:
-            near = np.linalg.norm(arms, axis=1) <= self.radius
-            cells, arms = cells[near], arms[near]
+        near = np.linalg.norm(arms, axis=1) <= self.extent
+        cells, arms = cells[near], arms[near]
         behind = arms @ np.array(self.normal) > 0.0
         return cells[~behind], cells[behind]
+
+    @property
+    def extent(self) -> float:
+        """Distance from the point to which it is limited, infinite if it is not, [length]."""
+        return np.inf if self.radius is None else self.radius
 
     def reach(self, mesh: BodyMesh) -> str:
         """Return in words where the body lies along the normal."""
@@ -115,8 +120,8 @@ class Preload(Part):
 
     def __post_init__(self) -> None:
         """Reject two aims at once, numbers that are not finite and regions that do not form a pair."""
-        given = [value for value in (self.force, self.shortening) if value is not None]
-        if len(given) > 1 or not np.isfinite(given).all():
+        given = self.aims
+        if len(given) > 1 or not np.isfinite([*given.values()]).all():
             raise InvalidInputError(
                 f"a Preload must have a finite force or a finite shortening, got force={self.force!r} and "
                 f"shortening={self.shortening!r}: give one of them, or none to hold the bolt at its length"
@@ -134,11 +139,15 @@ class Preload(Part):
     @property
     def place(self) -> str:
         """The body and what it does, in words."""
-        if self.force is not None:
-            return f"{self.label} drawn by {self.force:g} [force]"
-        if self.shortening is None:
-            return f"{self.label} held at its length"
-        return f"{self.label} shortened by {self.shortening:g} [length]"
+        words = {"force": "drawn by {:g} [force]", "shortening": "shortened by {:g} [length]"}
+        aims = [words[name].format(value) for name, value in self.aims.items()]
+        return f"{self.label} {aims[0] if aims else 'held at its length'}"
+
+    @property
+    def aims(self) -> dict[str, float]:
+        """The force or the shortening by name, nothing if the bolt is held at its length."""
+        given = {"force": self.force, "shortening": self.shortening}
+        return {name: value for name, value in given.items() if value is not None}
 
     @property
     def label(self) -> str:
@@ -153,13 +162,11 @@ class Preload(Part):
     @property
     def is_free(self) -> bool:
         """Whether the shortening is unknown."""
-        return self.force is not None
+        return "force" in self.aims
 
-    def with_aim_of(self, other: Preload | None) -> Preload:
-        """Return it with force or shortening of another one, held if there is none."""
-        if other is None:
-            return replace(self, force=None, shortening=None)
-        return replace(self, force=other.force, shortening=other.shortening)
+    def with_aims(self, aims: Mapping[str, float]) -> Preload:
+        """Return it with another force or shortening, held if there is none."""
+        return replace(self, force=aims.get("force"), shortening=aims.get("shortening"))
 
     def cut(self, mesh: BodyMesh) -> Cut:
         """Return the cut that the scene has made into the mesh of its body."""

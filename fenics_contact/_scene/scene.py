@@ -209,12 +209,12 @@ class LoadStep:
 
     def __post_init__(self) -> None:
         """Raise if loads are functions of time and no finite time is given."""
-        if self.time is not None and not np.isfinite(self.time):
+        if not np.isfinite(self._given.get("time", 0.0)):
             raise InvalidInputError(
                 f"time of LoadStep {self.name!r} must be a finite number or None, got {self.time!r}: give "
                 "the time at its end"
             )
-        if self.time is None and (callable(self.loads) or callable(self.supports)):
+        if "time" not in self._given and (callable(self.loads) or callable(self.supports)):
             raise InvalidInputError(
                 f"LoadStep {self.name!r} must have the time at its end for functions of it: give time=..."
             )
@@ -227,18 +227,21 @@ class LoadStep:
                 preload, fluid or constraint.
             UserCodeError: If it raises.
         """
-        loads = scene.loads if self.loads is None else self.loads
-        supports = scene.supports if self.supports is None else self.supports
-        end = 0.0 if self.time is None else self.time
-        if self.contacts is not None:
-            scene = replace(scene, contacts=tuple(self.contacts))
-        if self.preloads is not None:
-            scene = replace(scene, preloads=changed_by(scene, self.preloads))
-        if self.fluids is not None:
-            scene = replace(scene, contacts=with_pressures(scene.contacts, self.fluids))
-        if self.constraints is not None:
-            scene = replace(scene, constraints=with_values(scene.constraints, self.constraints))
-        return self._with(scene, loads, supports, end)
+        given = {"loads": scene.loads, "supports": scene.supports, "time": 0.0, **self._given}
+        if "contacts" in given:
+            scene = replace(scene, contacts=tuple(given["contacts"]))
+        if "preloads" in given:
+            scene = replace(scene, preloads=changed_by(scene, given["preloads"]))
+        if "fluids" in given:
+            scene = replace(scene, contacts=with_pressures(scene.contacts, given["fluids"]))
+        if "constraints" in given:
+            scene = replace(scene, constraints=with_values(scene.constraints, given["constraints"]))
+        return self._with(scene, given["loads"], given["supports"], given["time"])
+
+    @property
+    def _given(self) -> dict[str, Any]:
+        """What is given of it, by the names of the fields."""
+        return {name: value for name, value in vars(self).items() if value is not None}
 
     def at(self, scene: Scene, time: float) -> Scene:
         """Return a scene with the functions of time at another time; the rest stays as it is."""

@@ -38,8 +38,8 @@ def _cut(mesh: BodyMesh, preload: Preload) -> BodyMesh:
     if isinstance(section, Section):
         before, behind = section.sides(mesh, body)
         where = section.reach(mesh)
-        if section.radius is not None:
-            where += f", its {counted(len(before) + len(behind), 'cell')} within {section.radius:g} matter"
+        if np.isfinite(section.extent):
+            where += f", its {counted(len(before) + len(behind), 'cell')} within {section.extent:g} matter"
     else:
         before, behind = (cells_of_region(mesh, body, name) for name in section)
         where = "the two regions have no common face"
@@ -90,19 +90,19 @@ def require_preloads(scene: SceneParts) -> None:
 
 def changed_by(scene: SceneParts, given: Sequence[Preload]) -> tuple[Preload, ...]:
     """Return the preloads of a load step: those given, all others held at their lengths."""
-    aims = {preload.key: preload for preload in given}
+    aims = {preload.key: preload.aims for preload in given}
     unknown = aims.keys() - {preload.key for preload in scene.preloads}
     if unknown:
         raise InvalidInputError(
             f"LoadStep.preloads has a section of body {min(body for body, _ in unknown)!r} that the scene "
             "does not have: give the scene all, those that are tightened later without force or shortening"
         )
-    return tuple(preload.with_aim_of(aims.get(preload.key)) for preload in scene.preloads)
+    return tuple(preload.with_aims(aims.get(preload.key, {})) for preload in scene.preloads)
 
 
 def held_at(scene: SceneParts, lengths: np.ndarray) -> tuple[Preload, ...]:
     """Return the preloads with the shortenings before the load step, shape (n,), where they are held."""
     return tuple(
-        replace(each, shortening=float(length)) if each.force is None and each.shortening is None else each
+        each if each.aims else replace(each, shortening=float(length))
         for each, length in zip(scene.preloads, lengths, strict=True)
     )

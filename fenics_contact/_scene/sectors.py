@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -62,13 +62,15 @@ class CyclicSymmetry(PairPart):
         """Reject points and axes that are not finite, and an angle that does not divide a turn."""
         at = checked_point("CyclicSymmetry.at", self.at, "give a point on the axis")
         object.__setattr__(self, "at", at)
-        if (self.axis is None) != (len(self.at) == 2):
+        if (self.axis is None) != self.is_plane:
             raise InvalidInputError(
                 f"CyclicSymmetry needs an axis in space and none in the plane, got at={self.at!r} and axis="
                 f"{self.axis!r}: give its direction with three coordinates, or leave it out"
             )
-        if self.axis is not None:
-            object.__setattr__(self, "axis", unit_vector("CyclicSymmetry.axis", self.axis, 3))
+        if not self.is_plane:
+            object.__setattr__(
+                self, "axis", unit_vector("CyclicSymmetry.axis", cast("GivenVector", self.axis), 3)
+            )
         if self.angle is not None:
             whole_sectors(self.place, self.angle)
         if self.slave == self.master:
@@ -98,16 +100,25 @@ class CyclicSymmetry(PairPart):
         """Itself."""
         return (self,)
 
+    @property
+    def is_plane(self) -> bool:
+        """Whether it lies in the plane, with an axis across."""
+        return len(self.at) == 2
+
+    @property
+    def _axis(self) -> GivenVector:
+        """Its axis, in the plane that across."""
+        return self.axis or (0.0, 0.0, 1.0)
+
     def matrix(self, angle: float) -> np.ndarray:
         """Return the rotation about the axis by an angle, shape (dim, dim)."""
-        axis = (0.0, 0.0, 1.0) if self.axis is None else self.axis
-        turn = Rotation.from_rotvec(angle * np.array(axis)).as_matrix()
+        turn = Rotation.from_rotvec(angle * np.array(self._axis)).as_matrix()
         return np.asarray(turn[: len(self.at), : len(self.at)])
 
     @property
     def across(self) -> np.ndarray:
         """Orthonormal directions across the axis, shape (2, dim)."""
-        return np.eye(2) if self.axis is None else np.asarray(tangent_bases(np.array([self.axis]))[0])
+        return np.eye(2) if self.is_plane else np.asarray(tangent_bases(np.array([self._axis]))[0])
 
     def measured_angle(self, slave: BodyMesh, master: BodyMesh) -> float:
         """Return the angle that turns the master onto the slave, in radians, a whole part of a turn.
@@ -119,7 +130,7 @@ class CyclicSymmetry(PairPart):
             return whole_sectors(self.place, self.angle)
         sides = ((slave, self.slave.name), (master, self.master.name))
         first = self.across
-        second = np.cross(self.axis, first[0]) if self.axis is not None else first[1]
+        second = first[1] if self.is_plane else np.cross(self._axis, first[0])
         middles = [surface_moments(mesh.points, mesh.surfaces[name]).centroid for mesh, name in sides]
         arms = np.array([middle - np.array(self.at) for middle in middles]) @ np.array([first[0], second]).T
         near = [1e-6 * np.ptp(mesh.points[mesh.surfaces[name]], axis=(0, 1)).max() for mesh, name in sides]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -127,9 +128,11 @@ class Spring(Part):
         for name, end in self.surfaces.items():
             require_nodes(scene, end.body, end.name, f"Spring.{name}")
         dim, revolved = scene.kinematics.dim, not scene.kinematics.can_rotate
-        for name in ("stiffness", "second"):
-            given, known = getattr(self, name), np.isfinite if name == "second" else np.ones_like
-            if isinstance(given, tuple) and (len(given) != dim or not np.all(known(given))):
+        numbers = {"stiffness": self.along_axes} if self.along_axes else {}
+        if "second" not in self.surfaces:
+            numbers["second"] = cast("GivenVector", self.second)
+        for name, given in numbers.items():
+            if len(given) != dim or not (name == "stiffness" or np.isfinite(given).all()):
                 raise InvalidInputError(
                     f"Spring.{name} of {self.label!r} must have {dim} finite numbers, got {given!r}: give "
                     "one for each axis"

@@ -106,7 +106,7 @@ class ToolBody(Body):
 
 def tools_in(bodies: Mapping[str, Body]) -> dict[str, ToolBody]:
     """Return the bodies that carry the motions of tools."""
-    return {name: body for name, body in bodies.items() if isinstance(body, ToolBody)}
+    return {name: cast("ToolBody", body) for name, body in bodies.items() if body.is_rigid}
 
 
 def tools_of(contacts: Sequence[ContactPair]) -> dict[str, tuple[RigidTool, str]]:
@@ -136,9 +136,8 @@ def bodies_with_tools(bodies: Mapping[str, Body], contacts: Sequence[ContactPair
     much = any(body.deforms_much for body in own.values())
     made = dict(own)
     for name, (tool, slave) in tools.items():
-        known = before.get(name)
-        if known is not None and known.tool == tool and known.deforms_much == much:
-            made[name] = known
+        if name in before and before[name].tool == tool and before[name].deforms_much == much:
+            made[name] = before[name]
         elif slave in own:  # a wrong name is an error of its own
             if tool.dim != own[slave].mesh.dim:
                 raise InvalidInputError(
