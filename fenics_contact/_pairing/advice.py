@@ -13,9 +13,9 @@ from fenics_contact._pairing.projection import shared_projection
 from fenics_contact._pairing.uneven_pressure import unevenness
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.parts import may_touch
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
-from fenics_contact._scene.touching import may_touch
 from fenics_contact._surfaces.facets import FacetedSurface, shape_functions
 from fenics_contact._surfaces.projection import node_weights
 from fenics_contact._surfaces.true_surface import Geometry

@@ -16,11 +16,10 @@ from fenics_contact._pairing.points import ContactPoints, NodeNumbers, in_free_f
 from fenics_contact._pairing.tips import carrying
 from fenics_contact._scene.local_axes import NO_AXES, LocalAxes
 from fenics_contact._scene.pairs import ContactPair
-from fenics_contact._scene.parts import slave_of, surface_of
+from fenics_contact._scene.parts import may_touch, slave_of, surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.thickness import thickness_on
-from fenics_contact._scene.touching import may_touch
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log

@@ -25,7 +25,7 @@ from fenics_contact._scene.local_axes import (
     held_along,
     same_axes,
 )
-from fenics_contact._scene.pairs import ContactPair, Surface, pressures_of
+from fenics_contact._scene.pairs import ContactPair, PairPart, Surface, pressures_of
 from fenics_contact._scene.part import Part, body_of
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.revolution import hold_axis, require_all_or_none, require_simple_torsion
@@ -387,6 +387,13 @@ def slave_of(
     """Return the slave of a pair, as `surface_of`; by mortar with the areas of the pieces of its facets."""
     surface = surface_of(scene, pair.slave, geometry, finer=finer)
     return as_mortar_slave(scene, pair.slave, surface) if pair.discretisation == "mortar" else surface
+
+
+def may_touch(bodies: Mapping[str, Body], pair: PairPart, slave: FacetedSurface) -> np.ndarray:
+    """Return which nodes of the slave of a pair may touch its master, shape (len(slave.nodes),)."""
+    if not pair.single_nodes:
+        return np.ones(len(slave.nodes), dtype=bool)
+    return np.isin(slave.nodes, bodies[pair.slave.body].mesh.node_sets[pair.single_nodes])
 
 
 def as_mortar_slave(scene: SceneParts, side: Surface, surface: FacetedSurface) -> FacetedSurface:

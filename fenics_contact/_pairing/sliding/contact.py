@@ -39,9 +39,8 @@ from fenics_contact._pairing.sliding.surfaces import OnMeans, OnOwnBody, OnPatch
 from fenics_contact._pairing.sliding.tools import OnTool
 from fenics_contact._pairing.tips import carrying
 from fenics_contact._scene.local_axes import NO_AXES, LocalAxes
-from fenics_contact._scene.parts import slave_of, surface_of
+from fenics_contact._scene.parts import may_touch, slave_of, surface_of
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.touching import may_touch
 from fenics_contact.errors import InvalidInputError, together
 
 #: Kinds of counterparts of nodes that move far, the first that serves a pair has it.
