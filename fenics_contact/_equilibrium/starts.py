@@ -203,8 +203,10 @@ class CoarseStart:
         coarse = self.state.scene
         if list(scene.bodies) != list(coarse.bodies) or not set(self.refinements) <= set(scene.bodies):
             return False
-        ways = ((coarse.bodies[n].mesh, self.refinements.get(n), b.mesh) for n, b in scene.bodies.items())
-        return all(_leads_to(*way) for way in ways)
+        meshes = {name: (coarse.bodies[name].mesh, body.mesh) for name, body in scene.bodies.items()}
+        others = (meshes[name] for name in meshes if name not in self.refinements)
+        kept = [np.array_equal(before.cells, after.cells) for before, after in others]
+        return all(kept) and all(each.fits(*meshes[name]) for name, each in self.refinements.items())
 
     def check(self, scene: Scene) -> None:
         """Reject a start that does not fit the meshes of a scene."""
@@ -277,16 +279,6 @@ class CoarseStart:
 
 #: What multipliers are guessed from.
 Start = NoStart | SameMeshes | CoarseStart
-
-
-def _leads_to(coarse: BodyMesh, refinement: Refinement | MeshTransfer | None, fine: BodyMesh) -> bool:
-    """Return whether a refinement may lead from one mesh to another; None: they have the same cells."""
-    if refinement is None:
-        return fine is coarse or np.array_equal(fine.cells, coarse.cells)
-    if isinstance(refinement, MeshTransfer):
-        return refinement.fits(coarse, fine)
-    covered = int(refinement.parents.max(initial=-1)) + 1
-    return fine.cells.shape == refinement.positions.shape[:2] and covered == coarse.n_cells
 
 
 def interpolated(

@@ -71,15 +71,15 @@ def _check_balance(
     if left is None:
         return
     without_margin = balance.left(1.0)
-    part, left = (1.0 - MARGIN, left) if without_margin is None else (1.0, without_margin)
+    part, left = (1.0, without_margin) if without_margin is not None else (1.0 - MARGIN, left)
     found = _Motion.of(balance, part, left, bodies)
-    if found.slides and without_margin is not None:
+    if found.slides and part == 1.0:
         found = _tipping(balance, bodies) or found
     # The certificate points against the right side, which is minus the load. The pushed body may take others
     # along: it is the one on which the load does most work.
     pushed = int(np.argmax(np.einsum("bm,bm->b", found.bodies, loads)))
     _require_closed(torn, bodies, found)
-    if without_margin is None:
+    if part < 1.0:
         raise InfeasibleError(
             f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} is "
             f"held only just: the load uses up all friction against {found.words(pushed)}, and how far it "

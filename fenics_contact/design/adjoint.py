@@ -98,7 +98,7 @@ class LinearisedFace:
     weak: WeakPoints
 
 
-def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -> LinearisedFace:
+def linearise_face(state: State, choice: WeakChoice) -> LinearisedFace:
     """Classify the contact points of a state and build both bases. Collective."""
     torn, rows = state.torn, state.rows
     layout, bound, step = torn.layout, rows.slip_bound, rows.step
@@ -127,7 +127,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     )
     starting = weak.vanishing & held & ~at_rest
     tested, growing = face.restriction, face.slip | starting
-    moving = tested + growth_of(face, growing, coefficient) if coupling else tested
+    moving = tested + growth_of(face, growing, coefficient)
     slip_direction = np.where(face.slip[:, None], direction, 0.0)
     contacts, discs = torn.decomposition.comm.allreduce(counted.counts)
     points = WeakPoints(int(contacts), int(discs), _points_on_edges(state), choice)
@@ -293,8 +293,8 @@ def solve_adjoint(
     by_multiplier = np.where(entries > 0.0, partials.by_multiplier, 0.0)
     right = linearised.moving.T @ (factor * (system.jump(flexed) - by_multiplier))
     load = np.asarray(problem.comm.allreduce(system.kernel.resultants(partials.by_displacement)))
-    if partials.by_motion is not None:
-        load += system.points.T @ partials.by_motion
+    points = system.points
+    load += points.T @ np.broadcast_to(partials.by_motion, points.shape[0])
     # At a minimum of the energy without slip the adjoint multiplier is minus the multiplier itself.
     guess = state.solution.multiplier if start is None else start
     begin = _begin(problem, transposed, right, load, linearised.tested.T @ (guess / factor))
@@ -414,7 +414,7 @@ def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Pa
         by_multiplier=own.by_multiplier - compliance.sprung(by_position),
         by_area=by_area,
         by_jump=own.by_jump + by_position,
-        by_motion=moved if own.by_motion is None else own.by_motion + moved,
+        by_motion=own.by_motion + moved,
     )
 
 

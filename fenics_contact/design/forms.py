@@ -52,13 +52,29 @@ class Density:
     degree: int = 2
 
 
+class EveryNode:
+    """The nodes that move where no design is known: all."""
+
+    def __getitem__(self, nodes: np.ndarray) -> np.ndarray:
+        return np.ones(len(nodes), dtype=bool)
+
+    def any(self) -> bool:
+        """Return whether there is one."""
+        return True
+
+
+#: Marks of the nodes of all bodies that move.
+Moving = np.ndarray | EveryNode
+EVERY_NODE = EveryNode()
+
+
 class ShapeForms:
     """Compiled functionals of one or two displacement fields and their derivatives.
 
     A functional is compiled on first use, by all ranks together. ``materials`` are those of a `Composition`.
     """
 
-    def __init__(self, comm: MPI.Comm, moving: np.ndarray | None = None) -> None:
+    def __init__(self, comm: MPI.Comm, moving: Moving = EVERY_NODE) -> None:
         """Start empty."""
         self.moving = moving
         self._templates = Templates(comm)
@@ -72,7 +88,7 @@ class ShapeForms:
     @property
     def nothing_moves(self) -> bool:
         """Whether no derivative by nodes is needed, so that none need be compiled."""
-        return self.moving is not None and not self.moving.any()
+        return not self.moving.any()
 
     @property
     def compiled(self) -> tuple[tuple[object, ...], ...]:
@@ -193,7 +209,7 @@ def sum_over_subdomains(
     torn: TornSystem,
     fields: Sequence[np.ndarray],
     evaluate: Callable[[Subdomain, Sequence[_dolfinx.fem.Function]], np.ndarray],
-    moving: np.ndarray | None = None,
+    moving: Moving = EVERY_NODE,
 ) -> np.ndarray:
     """Add up nodal derivatives over this rank's subdomains, shape (n_nodes, dim) for all bodies."""
     tearing = torn.decomposition.tearing
@@ -206,14 +222,14 @@ def sum_over_subdomains(
 
 
 def subdomain_fields(
-    torn: TornSystem, fields: Sequence[np.ndarray], moving: np.ndarray | None = None
+    torn: TornSystem, fields: Sequence[np.ndarray], moving: Moving = EVERY_NODE
 ) -> Iterator[tuple[Subdomain, list[_dolfinx.fem.Function]]]:
     """Yield each of this rank's subdomains with the fields as Functions on it."""
     tearing = torn.decomposition.tearing
     starts = np.cumsum([0] + [subdomain.mesh.size for subdomain in torn.subdomains])
     for subdomain, start in zip(torn.subdomains, starts[:-1], strict=True):
         mesh = subdomain.mesh
-        if moving is not None and not moving[tearing.global_nodes(mesh.body, mesh.nodes)].any():
+        if not moving[tearing.global_nodes(mesh.body, mesh.nodes)].any():
             continue
         # Systems of several geometries share the meshes: another one may have moved them in the meantime.
         points = torn.scene.bodies[mesh.body].mesh.points

@@ -14,7 +14,7 @@ from fenics_contact._scene.fields import gradients_of
 from fenics_contact._scene.load_part import SurfaceLoad
 from fenics_contact._scene.loads import Load, PointForce, TotalForce
 from fenics_contact._surfaces.facets import GaussPoint, gauss_points, surface_moments
-from fenics_contact.design.forms import ShapeForms, sets_in_use, sum_over_subdomains
+from fenics_contact.design.forms import Moving, ShapeForms, sets_in_use, sum_over_subdomains
 from fenics_contact.design.surface_derivatives import integral_pulled_back
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_mean_at
@@ -28,14 +28,12 @@ def field_by_places(
     load: Load,
     space: _dolfinx.fem.FunctionSpace,
     by_values: np.ndarray,
-    moving: np.ndarray | None,
+    moving: Moving,
 ) -> np.ndarray:
     """Return Σ_c g_c ∇f_c at the nodes that move, by dof of the displacement, shape (size,)."""
     mesh, dim, mesh_of_body = subdomain.mesh, torn.components, torn.scene.bodies[subdomain.mesh.body].mesh
     nodes = np.sort(mesh.nodes)
-    chosen = np.ones(len(nodes), dtype=bool)
-    if moving is not None:
-        chosen &= moving[torn.decomposition.tearing.global_nodes(mesh.body, nodes)]
+    chosen = moving[torn.decomposition.tearing.global_nodes(mesh.body, nodes)]
     if load.on_surface:
         chosen &= np.isin(nodes, load.nodes_in(mesh_of_body))
     inputs, dofs = _dolfinx.node_dofs(space)
@@ -212,13 +210,13 @@ def _load_by_shape(
     return result
 
 
-def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
+def moving_loads(torn: TornSystem, moving: Moving) -> list[Load]:
     """Return the loads that act on moving volumes and surfaces."""
     tearing, bodies = torn.decomposition.tearing, torn.scene.bodies
 
     def moves(load: Load) -> bool:
         nodes = load.nodes_in(bodies[load.body].mesh)
-        return moving is None or bool(moving[tearing.global_nodes(load.body, nodes)].any())
+        return bool(moving[tearing.global_nodes(load.body, nodes)].any())
 
     found = [load for load in torn.scene.loads if moves(load)]
     if any(each.is_function for load in found for each in load.at_points):

@@ -30,7 +30,7 @@ class Partials:
         by_shape: ∂J/∂X at fixed u, λ, areas and B, this rank's share, shape (n_nodes, dim) for the nodes of
             all bodies; undefined at nodes that no design moves.
         by_motion: ∂J/∂q for the free motions of rigid surfaces, `FreeMotions`, replicated, shape (n_free,);
-            None where J depends on them through u alone.
+            or zero, where J depends on them through u alone.
         by_area: ∂J/∂A by the areas of the contact points, replicated, shape (n_points,), or zero.
         by_jump: ∂J/∂(B u − c), owned, shape (n_owned,), or zero: it serves the derivative by the shape, what
             it means for u is part of ``by_displacement``.
@@ -40,7 +40,7 @@ class Partials:
     by_displacement: np.ndarray
     by_multiplier: np.ndarray
     by_shape: np.ndarray
-    by_motion: np.ndarray | None = None
+    by_motion: np.ndarray | float = 0.0
     by_area: np.ndarray | float = 0.0
     by_jump: np.ndarray | float = 0.0
 
@@ -220,8 +220,7 @@ class WeightedSum(Weighable):
         parts = [(weight, objective.partials(state, forms)) for weight, objective in self.terms]
 
         def total(name: str) -> Any:
-            terms = [weight * values for weight, part in parts if (values := getattr(part, name)) is not None]
-            return sum(terms) if terms else None
+            return sum(weight * getattr(part, name) for weight, part in parts)
 
         return Partials(*(total(each.name) for each in fields(Partials)))
 

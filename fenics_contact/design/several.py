@@ -84,7 +84,7 @@ class _LargestCase:
         return sorted(point.parts.values(), key=lambda each: -each.value)[1:] if point else []
 
 
-class _SumOfCases(_LargestCase):
+class _SumOfCases:
     """The sum of weighted objectives."""
 
     def __init__(self, weights: dict[str, float]) -> None:
@@ -102,7 +102,7 @@ class _SumOfCases(_LargestCase):
             )
 
     @property
-    def size(self) -> float:  # type: ignore[override]
+    def size(self) -> float:
         return sum(map(abs, self._weights.values())) or 1.0
 
     def active(self, values: Mapping[str, float]) -> list[str]:
@@ -157,7 +157,9 @@ class LoadCases(JointProblem):
                 do not share their designs.
         """
         self.problems, self.weights = dict(problems), weights
-        self._total = _LargestCase() if weights is None else _SumOfCases(dict(weights))
+        self._total: _LargestCase | _SumOfCases = _LargestCase()
+        if weights is not None:
+            self._total = _SumOfCases(dict(weights))
         if not self.problems:
             raise InvalidInputError("LoadCases needs a problem, got none: give {'name': problem}")
         self._memory = record_of_values(self._at)
@@ -310,6 +312,8 @@ class LoadPath(JointProblem):
                 )
             _check_names(names)
         self.objectives = _checked(problem.comm, names, objectives or dict.fromkeys(names, problem.objective))
+        with together(problem.comm):
+            _check_last(names, self.objectives)
         self.problems: dict[str, ShapeProblem] = {}
         scene, last = problem.scene, problem
         for step in steps:
@@ -365,7 +369,7 @@ class LoadPath(JointProblem):
             objectives: Name of the step -> its objective, for some of the steps.
         """
         other = copy(self)
-        other.objectives = _checked(self.comm, list(self.problems), objectives, last=False)
+        other.objectives = _checked(self.comm, list(self.problems), objectives)
         other._memory = record_of_values(other._point_at)
         return other
 
@@ -437,8 +441,16 @@ def _check_names(names: Sequence[str]) -> None:
         )
 
 
+def _check_last(names: Sequence[str], objectives: Mapping[str, Objective]) -> None:
+    """Check that no step comes after the last objective, on which nothing depends."""
+    if names[-1] not in objectives:
+        raise InvalidInputError(
+            f"the last step needs an objective, got those of {list(objectives)}: leave out later steps"
+        )
+
+
 def _checked(
-    comm: MPI.Comm, names: Sequence[str], objectives: Mapping[str, Objective], *, last: bool = True
+    comm: MPI.Comm, names: Sequence[str], objectives: Mapping[str, Objective]
 ) -> dict[str, Objective]:
     """Return the objectives of steps in the order of the steps."""
     with together(comm):
@@ -449,9 +461,5 @@ def _checked(
         if not objectives or not set(objectives) <= set(names):
             raise InvalidInputError(
                 f"LoadPath.objectives must be those of steps {list(names)}, got those of {list(objectives)}"
-            )
-        if last and names[-1] not in objectives:
-            raise InvalidInputError(
-                f"the last step needs an objective, got those of {list(objectives)}: leave out later steps"
             )
     return {name: objectives[name] for name in names if name in objectives}

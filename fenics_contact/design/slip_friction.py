@@ -38,7 +38,7 @@ def solve_following_slip(
         partials,
         by_displacement=0.0 * partials.by_displacement,
         by_multiplier=0.0 * partials.by_multiplier,
-        by_motion=None,
+        by_motion=0.0,
         by_area=0.0,
         by_jump=0.0,
     )

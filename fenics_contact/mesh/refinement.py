@@ -48,6 +48,11 @@ class Refinement:
     positions: np.ndarray
     parts: tuple[Refinement, ...] = ()
 
+    def fits(self, coarse: BodyMesh, fine: BodyMesh) -> bool:
+        """Return whether it may lead from one mesh to the other: their numbers of cells agree."""
+        covered = int(self.parents.max(initial=-1)) + 1
+        return fine.cells.shape == self.positions.shape[:2] and covered == coarse.n_cells
+
     def after(self, first: Refinement) -> Refinement:
         """Return the refinement that leads from the mesh before another one to this mesh.
 

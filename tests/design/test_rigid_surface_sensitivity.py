@@ -65,7 +65,7 @@ def test_the_work_of_the_load_at_the_point_counts(name: str, monkeypatch: Patch)
     whole = sensitivity.solve_adjoint  # type: ignore[attr-defined]
 
     def without_points(state: State, partials: Partials, *more: Any, **named: Any) -> Any:
-        return whole(state, replace(partials, by_motion=None), *more, **named)
+        return whole(state, replace(partials, by_motion=0.0), *more, **named)
 
     monkeypatch.setattr(sensitivity, "solve_adjoint", without_points)
     assert here.miss(judge) > 1e-3
@@ -90,5 +90,5 @@ def test_slip_on_a_surface_beside_a_rigid_one_follows_its_motion(monkeypatch: Pa
     assert np.abs(judge.partials(here.state(), moving.geometry.forms).by_motion).max() > 0.0
     assert here.miss(judge) < 1e-5
     whole = FrictionWork.partials
-    monkeypatch.setattr(FrictionWork, "partials", lambda *given: replace(whole(*given), by_motion=None))
+    monkeypatch.setattr(FrictionWork, "partials", lambda *given: replace(whole(*given), by_motion=0.0))
     assert Line(moving, alpha + 1e-7, here.direction, 1e-5).miss(judge) > 1e-3

@@ -21,6 +21,7 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact._surfaces.facets import share_areas
+from fenics_contact.design.forms import EVERY_NODE
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke
@@ -133,7 +134,7 @@ def test_derivatives_by_the_shape_keep_forces_at_nodes_as_they_are() -> None:
     scene = Scene({"bar": Body(BAR, STEEL)}, [Support("bar", "x0")], [PointForce("bar", "end", lambda x: x)])
     state = solve_scene(scene, MPI.COMM_SELF)
     with pytest.raises(InvalidInputError, match=r"need forces at nodes as numbers, got a function"):
-        moving_loads(state.torn, None)
+        moving_loads(state.torn, EVERY_NODE)
 
 
 def test_nodes_slide_along_directions_that_a_function_gives() -> None:
