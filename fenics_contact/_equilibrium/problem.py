@@ -89,9 +89,9 @@ class ContactProblem:
         return {
             "scene": {name: body.in_words for name, body in self.scene.bodies.items()},
             "ranks": self.comm.size,
-            "solver": "that of the scene's plan" if self.solver is None else self.solver,
+            "solver": self.solver or "that of the scene's plan",
             "tolerance": "by default" if self.tolerance is None else self.tolerance,
-            "state": "none yet" if self.state is None else self.state.contact,
+            "state": self.state.contact if self.state else "none yet",
             "seconds": self.timer.seconds,
         }
 
@@ -120,7 +120,7 @@ class ContactProblem:
             self._warnings.warn_of_values(scene, self.comm)
             with self.timer.phase("decompose"):
                 self._decomposition = decompose(scene, self.partitions, self.comm, memory=self._memory)
-        elif held_by is not None and scene.supports != held_by.supports and scene.has_meshes_of(held_by):
+        elif held_by and scene.supports != held_by.supports and scene.has_meshes_of(held_by):
             self._decomposition = self._decomposition.holding(scene)
         self._held_by = scene
         return self._decomposition
@@ -253,7 +253,7 @@ class ContactProblem:
             _require_obstacles_at(scene, wanted.time)
             previous.before.check(scene)
         scene = previous.before.kept(scene)
-        equilibria = self._equilibria(scene, sensitivity=design or adjoint)
+        equilibria = self._equilibria(scene, self._kind(scene, sensitivity=design or adjoint))
         _dolfinx.warn_if_untested(self.comm.rank)  # once PETSc has started on the ranks that solve
         first = self.state if start == "last" else start
         linear = not scene.is_nonlinear
@@ -274,9 +274,8 @@ class ContactProblem:
         with together(self.comm):
             return choose_solver(scene, count, sensitivity=sensitivity)
 
-    def _equilibria(self, scene: Scene, *, sensitivity: bool) -> Equilibria:
+    def _equilibria(self, scene: Scene, kind: SolverKind) -> Equilibria:
         """Return what finds the equilibrium of a scene. Collective."""
-        kind = self._kind(scene, sensitivity=sensitivity)
         if kind is SolverKind.TANGENT_NEWTON:
             self._require_no_dual_solver()
             return self._deformed(scene)
@@ -323,7 +322,9 @@ class ContactProblem:
         """
         scene = scene or self.scene
         scene = continued(scene, stored)
-        return self._equilibria(scene, sensitivity=False).restored(stored, scene, self.state)
+        return self._equilibria(scene, self._kind(scene, sensitivity=False)).restored(
+            stored, scene, self.state
+        )
 
 
 def _require_scene(scene: object) -> None:

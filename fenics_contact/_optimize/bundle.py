@@ -215,8 +215,7 @@ def solve(program: QuadraticProgram) -> QuadraticSolution:
         P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with
         quadratic objectives, 2024.
     """
-    statuses = []
-    almost = None
+    statuses, almost = [], []
     for changes in _ATTEMPTS:
         answer = _run_clarabel(program, changes)
         statuses.append(str(answer.status))
@@ -225,23 +224,22 @@ def solve(program: QuadraticProgram) -> QuadraticSolution:
                 f"no point meets all constraints ({answer.status}): relax those that contradict each other"
             )
         if answer.status == clarabel.SolverStatus.Solved:
-            return _solution(program, answer, exact=True)
-        if almost is None and answer.status == clarabel.SolverStatus.AlmostSolved:
-            almost = answer
-    if almost is None:
+            return _solution(program, answer)
+        if answer.status == clarabel.SolverStatus.AlmostSolved:
+            almost.append(answer)
+    if not almost:
         raise SubproblemError(
             f"Clarabel reported {', '.join(statuses)} for a quadratic programme: rescale by `scale`"
         )
-    return _solution(program, almost, exact=False)
+    return _solution(program, almost[0])
 
 
-def _solution(
-    program: QuadraticProgram, answer: clarabel.DefaultSolution, *, exact: bool
-) -> QuadraticSolution:
+def _solution(program: QuadraticProgram, answer: clarabel.DefaultSolution) -> QuadraticSolution:
     first = program.equality_values.size
     pushes = np.array(answer.z, dtype=float)
     multipliers = np.maximum(pushes[first:], 0.0)
     point = np.array(answer.x, dtype=float)
+    exact = answer.status == clarabel.SolverStatus.Solved
     return QuadraticSolution(point, multipliers, pushes[:first], str(answer.status), exact)
 
 

@@ -486,7 +486,10 @@ class _Run:
         note: str = "",
     ) -> tuple[Record, ...]:
         """Return the history with one more evaluation, None for a trial point that does not exist."""
-        value = np.nan if evaluation is None else evaluation.value
+        value, error, violation = np.nan, 0.0, np.nan
+        if evaluation is not None:
+            value, error = evaluation.value, evaluation.error
+            violation = self.problem.constraints_at(evaluation).violation
         record = Record(
             iteration=state.iterations + (kind is StepKind.SERIOUS),
             kind=kind,
@@ -499,8 +502,8 @@ class _Run:
             aggregate_error=step.aggregate_error,
             bundle_size=state.bundle.size,
             evaluations=state.evaluations + 1,
-            error=0.0 if evaluation is None else evaluation.error,
-            violation=np.nan if evaluation is None else self.problem.constraints_at(evaluation).violation,
+            error=error,
+            violation=violation,
             note=note,
         )
         return (*state.history, record)

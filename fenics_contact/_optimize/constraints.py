@@ -113,6 +113,14 @@ class LinearConstraints:
     equality_matrix: ArrayLike | None = None
     equality_value: ArrayLike | None = None
 
+    @property
+    def equalities(self) -> list[tuple[ArrayLike, ArrayLike]]:
+        """E and e, none without equalities."""
+        given = [side for side in (self.equality_matrix, self.equality_value) if side is not None]
+        if len(given) == 1:
+            raise InvalidInputError("an equality needs both equality_matrix and equality_value, got only one")
+        return [(given[0], given[1])] if given else []
+
 
 @dataclass(frozen=True)
 class LocalFeasibleSet:
@@ -236,11 +244,9 @@ def _checked_rows(n: int, given: Any) -> tuple[Array, Array, Array, Array]:
     """Return A, b, E, e of linear constraints in either form."""
     rows = given if isinstance(given, LinearConstraints) else _of_scipy(given, n)
     matrix, limit = _rows(n, rows.matrix, rows.limit, "A", "b")
-    if (rows.equality_matrix is None) != (rows.equality_value is None):
-        raise InvalidInputError("an equality needs both equality_matrix and equality_value, got only one")
-    if rows.equality_matrix is None or rows.equality_value is None:
-        return matrix, limit, np.zeros((0, n)), np.zeros(0)
-    return matrix, limit, *_rows(n, rows.equality_matrix, rows.equality_value, "E", "e")
+    for equality, value in rows.equalities:
+        return matrix, limit, *_rows(n, equality, value, "E", "e")
+    return matrix, limit, np.zeros((0, n)), np.zeros(0)
 
 
 def _of_scipy(given: Any, n: int) -> LinearConstraints:

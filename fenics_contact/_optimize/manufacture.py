@@ -144,12 +144,8 @@ def joined(designs: Sequence[Net], *parts: tuple[int, LinearConstraints]) -> Lin
     for number, part in parts:
         if number not in range(len(designs)):
             raise InvalidInputError(f"there are {len(designs)} designs, got number {number}: count from 0")
-        for kind, matrix, limit in (
-            ("rows", part.matrix, part.limit),
-            ("equal", part.equality_matrix, part.equality_value),
-        ):
-            if matrix is None or limit is None:
-                continue
+        equal = [("equal", *each) for each in part.equalities]
+        for kind, matrix, limit in (("rows", part.matrix, part.limit), *equal):
             given, first, last = np.asarray(matrix, dtype=float), ends[number], ends[number + 1]
             if given.ndim != 2 or given.shape[1] != last - first:
                 raise InvalidInputError(

@@ -100,7 +100,7 @@ class FrictionAlone:
         if self._forces is None:
             return
         equilibrium = self._under(self.wedged * self.problem.law.bound(self._forces))
-        if equilibrium.motion is not None:
+        if not equilibrium.may_exist:
             raise InfeasibleError(
                 "friction needs surfaces that are pressed together, without friction even "
                 f"{self.wedged:g} times the forces leave {100 * equilibrium.error:.2g} % of it: press them"
@@ -422,8 +422,8 @@ class _Run:
         budget = last.budget_after(self.parameters.rescue_products, origin, state.best)
         left = max(self.parameters.max_products - operator.products, 1)
         begin = Start(origin, operator, state.memory, cold=False)
-        again = last.repeats(origin)
-        outcome = self.rescue(begin, min(budget, left), further=again, number=state.rescues)
+        enough = self.rescue.reduction if last.repeats(origin) else np.inf
+        outcome = self.rescue(begin, min(budget, left), enough=enough, number=state.rescues)
         line = self._line(state, origin, outcome)
         self.start.reached(line)
         iterate, answer = self._checked(outcome.iterate, state.exact_at)

@@ -222,7 +222,7 @@ def _first_slip_bound(problem: DualProblem, start: Start, margin: float = 1.1) -
     """
     if not start.cold:
         bound = problem.law.bound(start.iterate.multiplier)
-        if find_equilibrium(problem.with_law(TrescaLaw(problem.layout, bound))).motion is None:
+        if find_equilibrium(problem.with_law(TrescaLaw(problem.layout, bound))).may_exist:
             return bound
     return margin * problem.law.bound(find_equilibrium(problem).multiplier)
 

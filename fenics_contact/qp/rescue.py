@@ -185,20 +185,20 @@ class Rescue:
     face_forcing: float = 0.25
     face_loosest: float = 0.1
 
-    def __call__(self, start: Start, budget: int, *, further: bool = False, number: int = 0) -> Rescued:
-        """Improve an iterate; ``number``: of the rescue within the solve, from 0. Collective."""
+    def __call__(self, start: Start, budget: int, *, enough: float = np.inf, number: int = 0) -> Rescued:
+        """Improve an iterate, to ``enough``; ``number``: of the rescue in the solve, from 0. Collective."""
         problem, limit, memory = self.problem, start.operator.products + budget, start.memory
         if problem.preconditioner is None and not problem.compliance.gives_way and problem.coarse.m:
             iterate, line, memory = self._by_smalse(start, limit)
         else:
             factor = 1.0 if number < 4 else self.variety[(number - 4) % len(self.variety)]
-            iterate, line = self._by_proximal_points(start, factor * self.springs, limit, further)
-        reached = self._improved(iterate.residuals, start.iterate.residuals, further)
+            iterate, line = self._by_proximal_points(start, factor * self.springs, limit, enough)
+        reached = self._improved(iterate.residuals, start.iterate.residuals, enough)
         line = replace(line, products=start.operator.products, residuals=iterate.residuals)
         return Rescued(iterate, line, memory, reached)
 
     def _by_proximal_points(
-        self, start: Start, springs: float, limit: int, further: bool
+        self, start: Start, springs: float, limit: int, enough: float
     ) -> tuple[Iterate, SolverStep]:
         """Take Newton steps with springs, and move their centre whenever they converge. Collective."""
         path = self._first_centre(start, springs)
@@ -208,7 +208,7 @@ class Rescue:
             if not np.isfinite(iterate.residuals.worst):
                 iterate = start.iterate
                 break
-            improved = self._improved(iterate.residuals, start.iterate.residuals, further)
+            improved = self._improved(iterate.residuals, start.iterate.residuals, enough)
             solved = iterate.residuals.within(self.forcing.tolerance)
             if improved or solved or start.operator.products >= limit:
                 break
@@ -256,11 +256,11 @@ class Rescue:
         line = state.record(0, frozen, start.operator.products)
         return improved.iterate, replace(line, method="SMALSE rescue"), state.memory
 
-    def _improved(self, after: Residuals, before: Residuals, further: bool) -> bool:
+    def _improved(self, after: Residuals, before: Residuals, enough: float) -> bool:
         better = after.worst_in_scales_with(before) <= self.reduction * before.worst_in_scales_with(after)
         # Almost any iterate is far better than a very bad one, but not always good enough for Newton to
         # progress.
-        return better and (not further or after.worst <= self.reduction)
+        return better and after.worst <= enough
 
 
 @dataclass(frozen=True, eq=False)

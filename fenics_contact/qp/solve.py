@@ -45,6 +45,11 @@ class Equilibrium:
     error: float
     motion: Vector | None
 
+    @property
+    def may_exist(self) -> bool:
+        """Whether it is not proven that there is none."""
+        return self.motion is None
+
 
 def find_equilibrium(
     problem: DualProblem,
@@ -121,7 +126,7 @@ def may_grip(problem: DualProblem, multiplier: Vector) -> bool:
     # Where the sum is the resultant on one body, the equations contradict each other.
     if np.abs(gripping.unresisted()).max() > 1e-8 * load[-1]:
         return False
-    return find_equilibrium(replace(problem, coarse=gripping)).motion is None
+    return find_equilibrium(replace(problem, coarse=gripping)).may_exist
 
 
 class DualSolver(Protocol):
