@@ -61,11 +61,7 @@ class TransferredState:
                 between bodies that deform much, of friction by slip, of fluid in contacts, of preloads in
                 scenes with nonlinear materials.
         """
-        if not self.fields.fits(scene):
-            raise InvalidInputError(
-                "transfers must lead from the meshes of the state to those of the scene, got others, of "
-                f"{sorted(self.transfers)}: give the refinements with which both were made"
-            )
+        self.fields.check(scene)
         others = {
             "contact of bodies that deform much": bool(scene.contacts) and scene.deforms_much,
             "preloads in scenes with nonlinear materials": bool(scene.preloads) and scene.is_nonlinear,

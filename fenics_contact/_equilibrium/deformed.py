@@ -22,7 +22,7 @@ from fenics_contact._equilibrium.static_admissibility import (
     unresisted_in_words,
     unresisted_motions,
 )
-from fenics_contact._equilibrium.stored import Stored, require_rows, with_stored_slip
+from fenics_contact._equilibrium.stored import Stored, require_rows, require_shape, with_stored_slip
 from fenics_contact._equilibrium.warnings import advice
 from fenics_contact._fem.mechanics import History
 from fenics_contact._large_deformations.equations import (
@@ -510,12 +510,7 @@ def stored_configuration(
 ) -> tuple[Configuration, Loading]:
     """Return the configuration of a stored state, with its contact points, and its load. Collective."""
     tearing = decomposition.tearing
-    count, given = len(tearing.copy_subdomain), stored["displacement"].shape
-    if given != (count, tearing.components):
-        raise InvalidInputError(
-            f"a stored state needs displacements of {count} nodes of its subdomains, got shape {given}: give "
-            "the scene and the partition of that state"
-        )
+    require_shape(stored, "displacement", (len(tearing.copy_subdomain), tearing.components))
     here, block = decomposition.held
     by_block = np.zeros((len(here), tearing.components))
     by_block[block] = stored["displacement"][here]

@@ -212,7 +212,7 @@ class CoarseStart:
         """Reject a start that does not fit the meshes of a scene."""
         if not self.fits(scene):
             raise InvalidInputError(
-                "refinements must lead from the meshes of start to those of the scene, got others, of "
+                "refinements must lead from the meshes of the state to those of the scene, got others, of "
                 f"{sorted(self.refinements)}: give those with which the scene was made"
             )
 

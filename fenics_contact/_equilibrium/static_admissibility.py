@@ -79,17 +79,17 @@ def _check_balance(
     # along: it is the one on which the load does most work.
     pushed = int(np.argmax(np.einsum("bm,bm->b", found.bodies, loads)))
     _require_closed(torn, bodies, found)
-    if part < 1.0:
-        raise InfeasibleError(
-            f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} is "
-            f"held only just: the load uses up all friction against {found.words(pushed)}, and how far it "
-            "slides is not determined. Support it, or raise the friction coefficient"
-        )
-    raise InfeasibleError(
-        f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} can "
-        f"move away under the load: {found.words(pushed)} meets "
+    words = (
+        f"is held only just: the load uses up all friction against {found.words(pushed)}, and how far it "
+        "slides is not determined. Support it, or raise the friction coefficient"
+        if part < 1.0
+        else f"can move away under the load: {found.words(pushed)} meets "
         f"{'too little friction' if found.rubs else 'no resistance'}. {found.advice(pushed, torn, bodies)}"
         f"{found.companions(pushed, bodies)}"
+    )
+    name = bodies[pushed].name
+    raise InfeasibleError(
+        f"every body must be held by supports, contact or friction, but body {name!r} {words}"
     )
 
 

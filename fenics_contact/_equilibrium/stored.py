@@ -23,10 +23,14 @@ def with_stored_slip(torn: TornSystem, stored: Stored) -> TornSystem:
 
 def require_rows(torn: TornSystem, stored: Stored) -> None:
     """Reject a stored state with other rows."""
-    if stored["multiplier"].shape != (torn.numbering.total,):
+    require_shape(stored, "multiplier", (torn.numbering.total,))
+
+
+def require_shape(stored: Stored, name: str, shape: tuple[int, ...]) -> None:
+    """Reject a stored state with an array of another shape."""
+    if stored[name].shape != shape:
         raise InvalidInputError(
-            f"a stored state needs {torn.numbering.total} multipliers, got {stored['multiplier'].size}: "
-            "give the scene and the partition of that state"
+            f"a stored state needs {name}s {shape}, got {stored[name].shape}: give its scene and partition"
         )
 
 

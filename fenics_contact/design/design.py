@@ -231,15 +231,20 @@ def checked_variables(alpha: np.ndarray, size: int, comm: MPI.Comm) -> np.ndarra
     """Return design variables as a checked array. Collective on ``comm``."""
     with together(comm):
         variables = np.asarray(alpha, dtype=float)
-        if variables.shape != (size,):
-            raise InvalidInputError(
-                f"alpha must have shape ({size},), got {variables.shape}: one number per control point"
-            )
+        _require_size(variables, size, "alpha")
         if not np.isfinite(variables).all():
             first = int(np.flatnonzero(~np.isfinite(variables))[0])
             raise InvalidInputError(f"alpha must be finite, got {variables[first]} in entry {first}")
     require_alike(comm, described(variables, "alpha"))
     return variables
+
+
+def _require_size(alpha: np.ndarray, size: int, what: str) -> None:
+    """Check the number of variables."""
+    if np.shape(alpha) != (size,):
+        raise InvalidInputError(
+            f"{what} must have shape ({size},), got {np.shape(alpha)}: one number per control point"
+        )
 
 
 @displayed
@@ -272,11 +277,7 @@ class MovedSurface:
 
     def __post_init__(self) -> None:
         """Check the variables and the nodes' parameters."""
-        if np.shape(self.alpha) != (self.design.size,):
-            raise InvalidInputError(
-                f"alpha of the design on {self.design.body!r} must have shape ({self.design.size},), got "
-                f"{np.shape(self.alpha)}: give its part"
-            )
+        _require_size(self.alpha, self.design.size, f"alpha of the design on {self.design.body!r}")
         counts = self.design.lattice.counts
         grid = tensor_grid(self.ticks)
         rising = all((np.diff(ticks) > 0).all() for ticks in self.ticks)

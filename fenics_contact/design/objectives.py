@@ -80,22 +80,29 @@ class ContactForces(Weighable):
         return Partials.of(state, value, by_multiplier=on_rows(state, normal, tangential))
 
 
-def on_rows(state: State, normal: np.ndarray | None, tangential: np.ndarray | None) -> np.ndarray:
-    """Return values at the contact points in the owned rows of B, zero in all others, shape (n_owned,).
+def on_rows(state: State, normal: np.ndarray, tangential: np.ndarray) -> np.ndarray:
+    """Return values at the contact points in the owned rows of B, zero in all others, shape (n_owned,)."""
+    return on_normal_rows(state, normal) + on_tangential_rows(state, tangential)
 
-    `tangential`: values for the tangential rows, in the points' tangents, or None; those of points without
-    friction, which have no such rows, are left out.
+
+def on_normal_rows(state: State, values: np.ndarray) -> np.ndarray:
+    """Return values in the owned normal rows, zero in all others, shape (n_owned,)."""
+    return _on(state, state.torn.normal_rows, values)
+
+
+def on_tangential_rows(state: State, values: np.ndarray) -> np.ndarray:
+    """Return values in the points' tangents in the owned tangential rows, shape (n_owned,).
+
+    Those of points without friction, which have no such rows, are left out.
     """
     torn = state.torn
-    result = np.zeros(len(torn.numbering.owned))
-    parts = []
-    if normal is not None:
-        parts.append((torn.normal_rows, normal))
-    if tangential is not None:
-        parts.append((torn.tangential_rows.ravel(), tangential[torn.frictional].ravel()))
-    for rows, values in parts:
-        position = state.torn.numbering.owned_index(rows)
-        result[position[position >= 0]] = values[position >= 0]
+    return _on(state, torn.tangential_rows.ravel(), values[torn.frictional].ravel())
+
+
+def _on(state: State, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    result = np.zeros(len(state.torn.numbering.owned))
+    position = state.torn.numbering.owned_index(rows)
+    result[position[position >= 0]] = values[position >= 0]
     return result
 
 
@@ -222,7 +229,7 @@ class OfPressures(Weighable, ABC):
         """Return the derivatives by forces and areas; raises as `value` does. Collective."""
         value, by_force, by_area = self._evaluated(state)
         by_areas = by_true_areas(state, by_area)
-        return Partials.of(state, value, by_multiplier=on_rows(state, by_force, None), **by_areas)
+        return Partials.of(state, value, by_multiplier=on_normal_rows(state, by_force), **by_areas)
 
     def _evaluated(self, state: State) -> OfPoints:
         contact = state.contact
@@ -419,13 +426,13 @@ class FrictionWork(Weighable):
             elastic[torn.frictional] = torn.groups.slips.elastic_slip
             by_force = slip - elastic[:, None] * force
             by_area = elastic / torn.points.area * np.einsum("na,na->n", force, force)
-        by_slip, free = on_rows(state, None, force), state.torn.free
+        by_slip, free = on_tangential_rows(state, force), state.torn.free
         by_motion = -np.asarray(state.torn.decomposition.comm.allreduce(free.columns.T @ by_slip))
         return Partials.of(
             state,
             value,
             by_displacement=state.torn.force(by_slip),
-            by_multiplier=on_rows(state, None, by_force),
+            by_multiplier=on_tangential_rows(state, by_force),
             by_motion=by_motion,
             by_area=by_area,
             by_jump=by_slip,

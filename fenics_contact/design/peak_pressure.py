@@ -14,7 +14,7 @@ from fenics_contact._scene.parts import surface_of
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.objective import Partials, Weighable
-from fenics_contact.design.objectives import nothing_touches, on_rows, require_pair
+from fenics_contact.design.objectives import nothing_touches, on_normal_rows, require_pair
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.results.state import State
 
@@ -58,7 +58,7 @@ class PeakPressure(Weighable):
                 "PeakPressure has no derivative by the shape: take LargestPressure or PressureNorm"
             )
         value, by_force = self._weights(state)
-        return Partials.of(state, value, by_multiplier=on_rows(state, by_force, None))
+        return Partials.of(state, value, by_multiplier=on_normal_rows(state, by_force))
 
     def _weights(self, state: State) -> tuple[float, np.ndarray]:
         """Return the peak and its derivatives by the normal forces, shape (n_points,)."""

@@ -114,7 +114,7 @@ def test_a_stored_state_of_another_mesh_is_refused(tmp_path: Path) -> None:
     finer = replace(scene, bodies={"block": replace(body, mesh=rectangle((0, 0), (1, 1), (9, 8)))})
     with pytest.raises(InvalidInputError, match=r"in scene\.bodies\['block'\]\.mesh"):
         LoadSequence(problem(finer), checkpoint=file)
-    with pytest.raises(InvalidInputError, match=r"a stored state needs .*: give the scene and the partition"):
+    with pytest.raises(InvalidInputError, match=r"a stored state needs .*: give its scene and partition"):
         problem(finer).restore(stored_state(state))
     steel = replace(scene, bodies={"block": replace(body, material=PlaneStrain(100.0, 0.3))})
     with pytest.raises(InvalidInputError, match=r"differs \(there, here\) in"):
