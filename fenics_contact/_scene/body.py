@@ -250,7 +250,7 @@ def _needed(material: type) -> list[str]:
 def _check_material(material: Material, kinematics: Kinematics) -> None:
     if isinstance(material, type):
         raise InvalidInputError(
-            "a material must have its constants, got a class: write "
+            f"a material must have its constants, got the class {material.__name__}: write "
             f"{material.__name__}({', '.join(_needed(material))})"
         )
     name = type(material).__name__

@@ -25,7 +25,7 @@ from fenics_contact._scene.local_axes import (
     held_along,
     same_axes,
 )
-from fenics_contact._scene.pairs import ContactPair, PairPart, Surface, pressures_of
+from fenics_contact._scene.pairs import ContactPair, PairPart, Surface
 from fenics_contact._scene.part import Part, body_of
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.revolution import hold_axis, require_all_or_none, require_simple_torsion
@@ -78,7 +78,6 @@ class SceneParts:
         require_thickness(self.deforming, self.foundations, (*self.contacts, *self.ties))
         _require_different(self.contacts)
         _require_different(self.ties)
-        pressures_of(self.contacts)
         if self.torsion:
             tools = len(self.deforming) < len(self.bodies)
             others = {

@@ -14,8 +14,9 @@ from fenics_contact._scene.automatic import AutomaticContact
 from fenics_contact._scene.constraints import with_values
 from fenics_contact._scene.contact_facets import with_free_centres
 from fenics_contact._scene.discretisation import with_discretisation
+from fenics_contact._scene.fluid import pressures_of, with_pressures
 from fenics_contact._scene.loads import Load
-from fenics_contact._scene.pairs import ContactPair, Pairs, with_pressures
+from fenics_contact._scene.pairs import ContactPair, Pairs
 from fenics_contact._scene.parts import SceneParts
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.sections import changed_by, require_preloads, with_cuts
@@ -75,6 +76,7 @@ class Scene(SceneParts):
             object.__setattr__(self, "bodies", bodies)
             object.__setattr__(self, "contacts", pairs)
             super().__post_init__()
+        pressures_of(self.contacts)
         if self.preloads:
             object.__setattr__(self, "bodies", with_cuts(self))
         require_preloads(self)
