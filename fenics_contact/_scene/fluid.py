@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from itertools import chain
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from fenics_contact._base.checks import checked
-from fenics_contact._scene.checks import check_known, check_not_negative
+from fenics_contact._scene.checks import check_not_negative
 from fenics_contact._scene.fields import OfPosition
 from fenics_contact._scene.part import Around, require_linear, require_surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
-
-if TYPE_CHECKING:
-    from fenics_contact._scene.pairs import ContactPair
 
 
 @dataclass(frozen=True)
@@ -95,37 +90,3 @@ class FluidPressure:
                 "surface of the slave's body with which it shares an edge, or another function"
             )
         return found
-
-
-def pressures_of(pairs: Iterable[ContactPair]) -> dict[str, float]:
-    """Return the pressure of each fluid by its name, [force / length²].
-
-    Raises:
-        InvalidInputError: If a fluid has two.
-    """
-    found: dict[str, float] = {}
-    for fluid in chain.from_iterable(pair.fluids for pair in pairs):
-        if found.setdefault(fluid.name, fluid.pressure) != fluid.pressure:
-            raise InvalidInputError(
-                f"fluid {fluid.name!r} must have one pressure at all inlets, got {found[fluid.name]:g} "
-                f"and {fluid.pressure:g}: give different fluids different names"
-            )
-    return found
-
-
-def with_pressures(pairs: Iterable[ContactPair], given: Mapping[str, float]) -> tuple[ContactPair, ...]:
-    """Return the pairs with other pressures of some fluids, by name; others keep theirs.
-
-    Raises:
-        InvalidInputError: If there is no such fluid, or a pressure is negative.
-    """
-    pairs = tuple(pairs)
-    known = pressures_of(pairs)
-    for name in sorted(given):
-        words = f"LoadStep.fluids names {name!r}, the contact pairs of the scene have"
-        check_known(name, known, words, "use one of them, or give a pair this fluid")
-    return tuple(
-        replace(pair, fluid=replace(*changed, pressure=given[changed[0].name])) if changed else pair
-        for pair in pairs
-        for changed in ([fluid for fluid in pair.fluids if fluid.name in given],)
-    )

@@ -14,7 +14,7 @@ from fenics_contact._scene.automatic import AutomaticContact
 from fenics_contact._scene.constraints import with_values
 from fenics_contact._scene.contact_facets import with_free_centres
 from fenics_contact._scene.discretisation import with_discretisation
-from fenics_contact._scene.fluid import pressures_of, with_pressures
+from fenics_contact._scene.fluids_of_pairs import pressures_of, with_pressures
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.pairs import ContactPair, Pairs
 from fenics_contact._scene.parts import SceneParts

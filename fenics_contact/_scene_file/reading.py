@@ -26,7 +26,7 @@ from fenics_contact._optimize.nonlinear import NonlinearConstraint
 from fenics_contact._optimize.progress import Callback
 from fenics_contact._optimize.result import Result
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.fluid import pressures_of
+from fenics_contact._scene.fluids_of_pairs import pressures_of
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene_file.accuracy import not_refined
 from fenics_contact._scene_file.bodies import Shaped
