@@ -85,7 +85,7 @@ def subdomain_prices(edges: Sequence[int] = EDGES) -> str:
                 setting_up = seconds_of(partial(keep, subdomain, interface), 3)
                 product = sum(
                     seconds_of(partial(apply, given, found), 20, before=flush.sum)
-                    for apply in (operator.flex, operator.stiffen)
+                    for apply in (operator.apply_flexibility, operator.apply_stiffness)
                 )
                 row.append(f"{1e3 * setting_up:.1f} ({1e3 * predicted.setup:.1f})")
                 row.append(f"{1e3 * product:.3f} ({1e3 * predicted.product:.3f})")

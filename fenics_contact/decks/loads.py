@@ -24,7 +24,7 @@ from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.couplings import Driven
 from fenics_contact.decks.initial_stress import relieved
 from fenics_contact.decks.names import Forced
-from fenics_contact.decks.steps import Acting, Instant
+from fenics_contact.decks.steps import DistributedLoad, Instant
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.readers.deck_bodies import Component, region_names
 
@@ -95,7 +95,7 @@ class LoadBuilder:
         given = moment if np.any(moment) else None
         return [TotalForce(body, name, tuple(load[:dim]), given, tuple(at.tolist()))] if any(load) else []
 
-    def _weights(self, weight: Acting) -> Iterator[Load]:
+    def _weights(self, weight: DistributedLoad) -> Iterator[Load]:
         """Yield gravity or centrifugal force on bodies, by region where some are not loaded or differ."""
         deck = self.built.deck
         elements = deck.mesh.elements_named(weight.where[0], weight.card, weight.row)
@@ -111,7 +111,7 @@ class LoadBuilder:
             for region, density in densities.items():
                 yield self._weight(weight, part, density, region)
 
-    def _density(self, weight: Acting, section: int) -> float:
+    def _density(self, weight: DistributedLoad, section: int) -> float:
         name = self.built.deck.sections[section].material
         density = self.built.deck.materials[name].density
         if not density:
@@ -119,7 +119,7 @@ class LoadBuilder:
             raise weight.error(needed)
         return density
 
-    def _check_direction(self, weight: Acting, numbers: np.ndarray) -> None:
+    def _check_direction(self, weight: DistributedLoad, numbers: np.ndarray) -> None:
         """Reject directions that plane bodies and bodies of revolution do not have."""
         if self.built.deck.dim == 3:
             return
@@ -130,7 +130,9 @@ class LoadBuilder:
             needed = "the axis of revolution, y" if revolved else "z" if spins else "the plane"
             raise weight.error(f"{weight.where[1]} here must be along {needed}, got {numbers.tolist()}")
 
-    def _weight(self, weight: Acting, part: Component, density: float, region: str | None) -> BodyForce:
+    def _weight(
+        self, weight: DistributedLoad, part: Component, density: float, region: str | None
+    ) -> BodyForce:
         numbers = np.array(weight.numbers)
         self._check_direction(weight, numbers)
         if weight.where[1] == "GRAV":

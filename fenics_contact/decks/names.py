@@ -13,7 +13,7 @@ from fenics_contact.decks.cards import DeckCards
 from fenics_contact.decks.contact import Sides
 from fenics_contact.decks.couplings import Driven, by_node
 from fenics_contact.decks.multi_point import Equation
-from fenics_contact.decks.steps import Acting, DeckSteps, Held
+from fenics_contact.decks.steps import DeckSteps, DistributedLoad, Held
 from fenics_contact.decks.ties import reach_of
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import NO_FACES, Faces, joined
@@ -285,28 +285,28 @@ class _Naming:
             found.update((each.where, name) for each in several)
         return found
 
-    def _pressed_alike(self) -> list[list[Acting]]:
+    def _pressed_alike(self) -> list[list[DistributedLoad]]:
         """Return the pressures of all instants; those on single elements together that are always equal."""
         instants = self.steps.instants
-        first: dict[tuple[str, ...], Acting] = {}
+        first: dict[tuple[str, ...], DistributedLoad] = {}
         values: dict[tuple[str, ...], list[float]] = {}
         for number, instant in enumerate(instants):
             for each in instant.pressures:
                 first.setdefault(each.where, each)
                 values.setdefault(each.where, [0.0] * len(instants))[number] = each.value
-        found: dict[tuple[object, ...], list[Acting]] = {}
+        found: dict[tuple[object, ...], list[DistributedLoad]] = {}
         for where, each in first.items():
             single = len(where) == 2 and where[0].isdecimal()
             found.setdefault(tuple(values[where]) if single else where, []).append(each)
         return list(found.values())
 
-    def _single_faces(self, several: Sequence[Acting]) -> Faces:
+    def _single_faces(self, several: Sequence[DistributedLoad]) -> Faces:
         """Return the faces of single elements."""
         numbers = np.array([int(each.where[0]) for each in several])
         sides = np.array([int(each.where[1][1:]) - 1 for each in several])
         return Faces(self.mesh.positions(numbers, "element", several[0].card), sides)
 
-    def _faces(self, pressed: Acting) -> Faces:
+    def _faces(self, pressed: DistributedLoad) -> Faces:
         card, row = pressed.card, pressed.row
         if len(pressed.where) == 2:
             elements = self.mesh.elements_named(pressed.where[0], card, row)

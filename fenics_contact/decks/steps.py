@@ -122,7 +122,7 @@ class Ramp:
 
 
 @dataclass(frozen=True)
-class Acting(AtLine):
+class DistributedLoad(AtLine):
     """A pressure on faces, or a load on volumes: acceleration, or the square of an angular velocity.
 
     `where`: element set or element, and face or "GRAV" or "CENTRIF": ("TOP", "P2"); of a surface its name;
@@ -142,7 +142,7 @@ class Acting(AtLine):
         """Whether it is a load on volumes."""
         return self.where[-1] in ("GRAV", "CENTRIF") and len(self.where) > 1
 
-    def at(self, clock: Clock) -> Acting:
+    def at(self, clock: Clock) -> DistributedLoad:
         """Return it at a time."""
         return replace(self, value=float(clock.between(self.start, self.value, self.by)))
 
@@ -180,7 +180,7 @@ class Instant:
     time: float
     held: np.ndarray
     forces: np.ndarray
-    acting: Sequence[Acting]
+    acting: Sequence[DistributedLoad]
     temperatures: np.ndarray
     fixed: np.ndarray
     kept: np.ndarray
@@ -192,12 +192,12 @@ class Instant:
         return cls(0.0, zero, zero, (), initial, none, none)
 
     @property
-    def pressures(self) -> list[Acting]:
+    def pressures(self) -> list[DistributedLoad]:
         """The pressures on faces."""
         return [each for each in self.acting if not each.on_volume]
 
     @property
-    def weights(self) -> list[Acting]:
+    def weights(self) -> list[DistributedLoad]:
         """The loads on volumes."""
         return [each for each in self.acting if each.on_volume]
 
@@ -214,7 +214,7 @@ class StepState:
     held: Ramp
     forces: Ramp
     temperatures: Ramp
-    acting: Sequence[Acting]
+    acting: Sequence[DistributedLoad]
     fixed: np.ndarray
     kept: np.ndarray
 
@@ -284,7 +284,9 @@ class StepState:
         return np.concatenate([self.held.by[held], self.forces.by[forced], self.temperatures.by[:1], acting])
 
 
-def _added(known: Sequence[Acting], given: Sequence[Acting], reached: Sequence[Acting]) -> list[Acting]:
+def _added(
+    known: Sequence[DistributedLoad], given: Sequence[DistributedLoad], reached: Sequence[DistributedLoad]
+) -> list[DistributedLoad]:
     """Return loads with those of a step: pressures that it gives add up.
 
     What had an amplitude keeps it; what was ramped starts with its value at the end of the step before.
@@ -451,13 +453,13 @@ class Loads:
     replaced: set[str]
     forces: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, int]]
     temperatures: Sequence[tuple[np.ndarray, Any, int]]
-    acting: Sequence[Acting]
+    acting: Sequence[DistributedLoad]
 
     @classmethod
     def of(cls, group: Sequence[Card], mesh: DeckMesh, amplitudes: Amplitudes) -> Loads:
         """Return those of the cards of a step."""
         replaced, seen = set[str](), set[str]()
-        forces, temperatures, acting = list[Any](), list[Any](), list[Acting]()
+        forces, temperatures, acting = list[Any](), list[Any](), list[DistributedLoad]()
         for card in group:
             if card.name not in ("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"):
                 continue
@@ -514,7 +516,7 @@ def _forces(card: Card, mesh: DeckMesh) -> Iterator[tuple[np.ndarray, np.ndarray
         yield nodes, np.repeat(component, len(nodes)), np.full(len(nodes), numbers[1])
 
 
-def _distributed(card: Card, mesh: DeckMesh, by: int) -> Iterator[Acting]:
+def _distributed(card: Card, mesh: DeckMesh, by: int) -> Iterator[DistributedLoad]:
     """Yield the loads of a card on faces and volumes."""
     _check_single_faces(card, mesh)
     for row, entries in enumerate(card.rows):
@@ -534,7 +536,7 @@ def _distributed(card: Card, mesh: DeckMesh, by: int) -> Iterator[Acting]:
                 mesh.faces_of(mesh.elements_named(where[0], card, row), label, card, row)
         else:
             raise card.error(f"load {label!r} is not supported: give P1, P2, ..., GRAV or CENTRIF", row)
-        yield Acting(card, row, where, numbers[0], numbers[1:], by)
+        yield DistributedLoad(card, row, where, numbers[0], numbers[1:], by)
 
 
 def _check_weight(card: Card, row: int, label: str, numbers: Sequence[float]) -> None:

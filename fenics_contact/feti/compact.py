@@ -76,7 +76,8 @@ class CompactOperator:
 
     A third of the memory of S and its inverse as triangles in single and double precision, without factors of
     the inside. A product with S and two substitutions read it twice each, as many bytes as the inverse in
-    double precision. `flex_exactly` and all that is done once are in double precision, by refinement:
+    double precision. `apply_flexibility_exactly` and all that is done once are in double precision, by
+    refinement:
 
         u ← u + (L Lᵀ)⁻¹ (f − (S + ρ Q Qᵀ) u),
 
@@ -122,21 +123,21 @@ class CompactOperator:
 
     @property
     def flops(self) -> tuple[int, int]:
-        """Floating point operations of `flex` and of `stiffen`."""
+        """Floating point operations of `apply_flexibility` and of `apply_stiffness`."""
         return 2 * self._size**2, 2 * self._size**2
 
     def make_inside(self) -> Inside:
         """Assemble and factor what is inside."""
         return Inside(self._subdomain, self._interface)
 
-    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
+    def apply_flexibility(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb, in single precision, times an interface force into ``displacement``."""
         displacement[:] = self._substituted(force)
 
     def _substituted(self, force: np.ndarray) -> np.ndarray:
         """Return (L Lᵀ)⁻¹ f."""
         if self._lower.ndim == 2:
-            return np.asarray(self.flex_all(force[None])[0])
+            return np.asarray(self.apply_flexibility_to_all(force[None])[0])
         scaled, scale, usual = _scaled(force[None])
         if not usual[0]:
             return np.full(self._size, scale[0, 0])
@@ -144,7 +145,7 @@ class CompactOperator:
         moved = blas.stpsv(self._size, self._lower, half, lower=1, trans=1, overwrite_x=1)
         return np.asarray(moved * (scale[0] / self._unit))
 
-    def flex_exactly(self, force: np.ndarray, displacement: np.ndarray) -> None:
+    def apply_flexibility_exactly(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force in double precision, by refinement."""
         displacement[:] = self._refined(self._insides.of(self), force)
 
@@ -165,17 +166,17 @@ class CompactOperator:
         if self._lower.ndim == 1:
             self._lower = lapack.stpttr(self._size, self._lower, uplo="L")[0]
 
-    def flex_all(self, forces: np.ndarray) -> np.ndarray:
+    def apply_flexibility_to_all(self, forces: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times interface forces of several subdomains alike, the rows, shape (k, n_b)."""
         scaled, scale, usual = _scaled(forces)
         half = blas.strsm(1.0, self._lower, scaled.T, lower=1)
         moved = blas.strsm(1.0, self._lower, half, lower=1, trans_a=1, overwrite_b=1).T * (scale / self._unit)
         return np.where(usual[:, None], moved, scale)
 
-    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
+    def apply_stiffness(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, in single precision, times an interface displacement into ``force``."""
         if self._lower.ndim == 2:
-            force[:] = self.stiffen_all(displacement[None])[0]
+            force[:] = self.apply_stiffness_to_all(displacement[None])[0]
             return
         scaled, scale, usual = _scaled(displacement[None])
         if not usual[0]:
@@ -186,7 +187,7 @@ class CompactOperator:
         moved = blas.stpmv(self._size, self._lower, half, lower=1, overwrite_x=1)
         force[:] = (moved - self._modes @ (self._modes.T @ moved)) * (self._unit * scale[0])
 
-    def stiffen_all(self, displacements: np.ndarray) -> np.ndarray:
+    def apply_stiffness_to_all(self, displacements: np.ndarray) -> np.ndarray:
         """Return S, in single precision, times interface displacements, the rows, shape (k, n_b)."""
         scaled, scale, usual = _scaled(displacements)
         bent = (scaled - (scaled @ self._modes) @ self._modes.T).T

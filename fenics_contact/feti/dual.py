@@ -84,7 +84,7 @@ class DirichletPreconditioner:
 
     def _apply(self, residual: np.ndarray, contact: ContactBlock) -> np.ndarray:
         count_flops(self._numbering.comm, self._inverse.flops[1] + 4 * self._B.nnz)
-        result = self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
+        result = self._force(self._inverse.apply_stiffness(self._jump(residual, contact)), contact)
         result[self._soft] += self._sprung * residual[self._soft]
         return result
 
@@ -278,37 +278,44 @@ class DualSystem:
 
         In double precision, however K⁺ is stored.
         """
-        return self._applied(self.inverse.flex_exactly, multiplier)
+        return self._applied(self.inverse.apply_flexibility_exactly, multiplier)
 
     def apply_rounded(self, multiplier: np.ndarray) -> np.ndarray:
         """Return F λ in the precision in which K⁺ is stored. Collective."""
-        return self._applied(self.inverse.flex, multiplier)
+        return self._applied(self.inverse.apply_flexibility, multiplier)
 
     @property
     def _operators(self) -> tuple[Operator, Operator | None]:
         """What Krylov methods apply, and what confirms their answer where that is in single precision."""
         return (self.apply_rounded, self.apply) if self.inverse.is_rounded else (self.apply, None)
 
-    def _applied(self, flex: Callable[[np.ndarray], np.ndarray], multiplier: np.ndarray) -> np.ndarray:
+    def _applied(
+        self, apply_flexibility: Callable[[np.ndarray], np.ndarray], multiplier: np.ndarray
+    ) -> np.ndarray:
         self.products += 1
         numbering = self.torn.numbering
         count_flops(numbering.comm, self.inverse.flops[0] + 4 * self._B_interface.nnz)
         force = self._Bt_interface @ numbering.to_local(multiplier)
-        product = numbering.to_owned(self._B_interface @ flex(force))
+        product = numbering.to_owned(self._B_interface @ apply_flexibility(force))
         return self.torn.compliance.added(product, multiplier)
 
     def reach(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return abs(B) abs(u), the size of the displacements at each row, owned, [length]. Collective."""
-        moved = self._bent_by(self.inverse.flex, multiplier) + (self.kernel @ alpha)[self.inverse.interface]
+        moved = (
+            self._bent_by(self.inverse.apply_flexibility, multiplier)
+            + (self.kernel @ alpha)[self.inverse.interface]
+        )
         return self.torn.numbering.to_owned(abs(self._B_interface) @ np.abs(moved))
 
     def bent(self, multiplier: np.ndarray) -> np.ndarray:
         """Return K⁺(f − Bᵀλ) on the interface, (n_interface,), [length]; one product. Collective."""
-        return self._bent_by(self.inverse.flex_exactly, multiplier)
+        return self._bent_by(self.inverse.apply_flexibility_exactly, multiplier)
 
-    def _bent_by(self, flex: Callable[[np.ndarray], np.ndarray], multiplier: np.ndarray) -> np.ndarray:
+    def _bent_by(
+        self, apply_flexibility: Callable[[np.ndarray], np.ndarray], multiplier: np.ndarray
+    ) -> np.ndarray:
         count_flops(self.torn.numbering.comm, self.inverse.flops[0] + 2 * self._B_interface.nnz)
-        return self._bent - flex(self._Bt_interface @ self.torn.numbering.to_local(multiplier))
+        return self._bent - apply_flexibility(self._Bt_interface @ self.torn.numbering.to_local(multiplier))
 
     def force(self, multiplier: np.ndarray) -> np.ndarray:
         """Return Bᵀλ on this rank's torn dofs, [force]. Collective."""

@@ -72,29 +72,29 @@ class ExplicitOperator:
 
     @property
     def flops(self) -> tuple[int, int]:
-        """Floating point operations of `flex` and of `stiffen`."""
+        """Floating point operations of `apply_flexibility` and of `apply_stiffness`."""
         return 2 * self._size**2, 2 * self._size**2
 
-    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
+    def apply_flexibility(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force into ``displacement``."""
         if self._flexible.ndim == 2:
-            displacement[:] = self.flex_all(force[None])[0]
+            displacement[:] = self.apply_flexibility_to_all(force[None])[0]
         else:
             blas.dspmv(self._size, 1.0, self._flexible, force, y=displacement, overwrite_y=1, lower=1)
 
     #: Nothing is rounded.
-    flex_exactly = flex
+    apply_flexibility_exactly = apply_flexibility
 
     def share(self) -> None:
         """Store whole matrices from now on."""
         if self._flexible.ndim == 1:
             self._flexible, self._stiff = (_whole(self._size, each) for each in (self._flexible, self._stiff))
 
-    def flex_all(self, forces: np.ndarray) -> np.ndarray:
+    def apply_flexibility_to_all(self, forces: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times interface forces of several subdomains alike, the rows, shape (k, n_b)."""
         return np.asarray(forces @ self._flexible)
 
-    def stiffen_all(self, displacements: np.ndarray) -> np.ndarray:
+    def apply_stiffness_to_all(self, displacements: np.ndarray) -> np.ndarray:
         """Return S, in its precision, times interface displacements, the rows, shape (k, n_b)."""
         size = np.abs(displacements).max(axis=1, initial=0.0)
         usual = (size > 0.0) & np.isfinite(size)
@@ -104,14 +104,14 @@ class ExplicitOperator:
         forces[~usual] = size[~usual, None]
         return np.asarray(forces)
 
-    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
+    def apply_stiffness(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, in its precision, times an interface displacement into ``force``.
 
         The range of single precision suffices neither for all units nor for diverging iterates: both factors
         are scaled.
         """
         if self._stiff.ndim == 2:
-            force[:] = self.stiffen_all(displacement[None])[0]
+            force[:] = self.apply_stiffness_to_all(displacement[None])[0]
             return
         size = float(np.abs(displacement).max(initial=0.0))
         if size == 0.0 or not np.isfinite(size):
@@ -135,7 +135,7 @@ class ExplicitOperator:
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a vector, shape (n,)."""
         relaxed = self._solve_inside(right[self._inside])
-        self.flex(right[self._interface] - self._K_ib.T @ relaxed, trace := np.empty(self._size))
+        self.apply_flexibility(right[self._interface] - self._K_ib.T @ relaxed, trace := np.empty(self._size))
         solution = np.empty_like(right)
         solution[self._interface] = trace
         solution[self._inside] = relaxed - self._solve_inside(self._K_ib @ trace)
@@ -225,19 +225,19 @@ class FactoredOperator:
 
     @property
     def flops(self) -> tuple[int, int]:
-        """Floating point operations of `flex` and of `stiffen`: two for each entry and substitution."""
+        """Floating point operations of both operators: two for each entry and substitution."""
         return 4 * self._factor.entries, 4 * self._inside.entries + 2 * self._K_bb.nnz + 4 * self._K_bi.nnz
 
-    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
+    def apply_flexibility(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write the inverse on the interface times a force there into ``displacement``."""
         self._right[self._interface] = force
         self._factor.solve(self._right, self._left)
         displacement[:] = self._left[self._interface]
 
     #: Nothing is rounded.
-    flex_exactly = flex
+    apply_flexibility_exactly = apply_flexibility
 
-    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
+    def apply_stiffness(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write the Schur complement times an interface displacement into ``force``."""
         force[:], pulled = self._forces(displacement)
         self._inside.solve(pulled, self._inner)
@@ -253,7 +253,7 @@ class FactoredOperator:
 
     def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the displacement in equilibrium inside for one of the interface, and its force there."""
-        self.stiffen(displacement, force := np.empty_like(displacement))
+        self.apply_stiffness(displacement, force := np.empty_like(displacement))
         whole = np.empty(len(self._right))
         whole[self._interface] = displacement
         whole[self._rest] = -self._inner
@@ -262,13 +262,13 @@ class FactoredOperator:
     def share(self) -> None:
         """Factors are stored the same way for any number of subdomains."""
 
-    def flex_all(self, forces: np.ndarray) -> np.ndarray:
+    def apply_flexibility_to_all(self, forces: np.ndarray) -> np.ndarray:
         """Return the inverse times interface forces of several subdomains alike, the rows, shape (k, n_b)."""
         right = np.zeros((len(self._right), len(forces)), order="F")
         right[self._interface] = forces.T
         return np.asarray(self._factor.solve_many(right)[self._interface].T)
 
-    def stiffen_all(self, displacements: np.ndarray) -> np.ndarray:
+    def apply_stiffness_to_all(self, displacements: np.ndarray) -> np.ndarray:
         """Return the Schur complement times several interface displacements, the rows, shape (k, n_b)."""
         force, pulled = self._forces(displacements.T)
         force -= self._forces_from_inside(self._inside.solve_many(pulled))
@@ -426,7 +426,7 @@ class TornInverse:
 
     @cached_property
     def flops(self) -> tuple[int, int]:
-        """Floating point operations of `flex` and of `stiffen`."""
+        """Floating point operations of `apply_flexibility` and of `apply_stiffness`."""
         every = np.array([operator.flops for operator in self.operators], dtype=np.int64).reshape(-1, 2)
         flexed, stiffened = every.sum(axis=0).tolist()
         return flexed, stiffened
@@ -440,24 +440,26 @@ class TornInverse:
                 solution[own] = self.operators[index].invert(right[own])
         return solution
 
-    def flex(self, force: np.ndarray) -> np.ndarray:
+    def apply_flexibility(self, force: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times an interface force, shape (n_interface,)."""
-        return self._each(lambda one: one.flex, lambda all_: all_.flex_all, force)
+        return self._each(
+            lambda one: one.apply_flexibility, lambda all_: all_.apply_flexibility_to_all, force
+        )
 
     @property
     def is_rounded(self) -> bool:
-        """Whether `flex` is in single precision."""
+        """Whether `apply_flexibility` is in single precision."""
         return self._kind is LocalKind.COMPACT
 
-    def flex_exactly(self, force: np.ndarray) -> np.ndarray:
+    def apply_flexibility_exactly(self, force: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times an interface force, in double precision however it is stored."""
         if not self.is_rounded:
-            return self.flex(force)
+            return self.apply_flexibility(force)
         return_memory()  # where directions of a Krylov method were
         result = np.empty_like(force)
         for index in self._by_kind:
             part = self._parts[index]
-            self.operators[index].flex_exactly(force[part], result[part])
+            self.operators[index].apply_flexibility_exactly(force[part], result[part])
         return result
 
     @cached_property
@@ -466,9 +468,11 @@ class TornInverse:
         first = {id(kind): number for number, kind in enumerate(self.kinds)}
         return sorted(range(len(self._members)), key=lambda index: first[id(self._members[index][0])])
 
-    def stiffen(self, displacement: np.ndarray) -> np.ndarray:
+    def apply_stiffness(self, displacement: np.ndarray) -> np.ndarray:
         """Return S times an interface displacement, shape (n_interface,)."""
-        return self._each(lambda one: one.stiffen, lambda all_: all_.stiffen_all, displacement)
+        return self._each(
+            lambda one: one.apply_stiffness, lambda all_: all_.apply_stiffness_to_all, displacement
+        )
 
     def energy(self, displacement: np.ndarray) -> tuple[float, np.ndarray]:
         """Return wᵀ S w of this rank and S w, shape (n_interface,), both in double precision.

@@ -20,10 +20,10 @@ class SharedOperator(LocalOperator, Protocol):
     def share(self) -> None:
         """Prepare for several subdomains."""
 
-    def flex_all(self, forces: np.ndarray) -> np.ndarray:
+    def apply_flexibility_to_all(self, forces: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times the interface forces of several subdomains, the rows, shape (k, n_b)."""
 
-    def stiffen_all(self, displacements: np.ndarray) -> np.ndarray:
+    def apply_stiffness_to_all(self, displacements: np.ndarray) -> np.ndarray:
         """Return S, or a close approximation, times interface displacements, the rows, shape (k, n_b)."""
 
 
@@ -151,22 +151,22 @@ class CongruentOperator:
 
     @property
     def flops(self) -> tuple[int, int]:
-        """Floating point operations of `flex` and of `stiffen`."""
+        """Floating point operations of `apply_flexibility` and of `apply_stiffness`."""
         return self.first.flops
 
-    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
+    def apply_flexibility(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force, shape (n_b,), into ``displacement``."""
-        self.first.flex(self._interface.there(force), moved := np.empty_like(force))
+        self.first.apply_flexibility(self._interface.there(force), moved := np.empty_like(force))
         displacement[:] = self._interface.back(moved)
 
-    def flex_exactly(self, force: np.ndarray, displacement: np.ndarray) -> None:
+    def apply_flexibility_exactly(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write the same in double precision, however the first one is stored."""
-        self.first.flex_exactly(self._interface.there(force), moved := np.empty_like(force))
+        self.first.apply_flexibility_exactly(self._interface.there(force), moved := np.empty_like(force))
         displacement[:] = self._interface.back(moved)
 
-    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
+    def apply_stiffness(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, or a close approximation, times an interface displacement into ``force``."""
-        self.first.stiffen(self._interface.there(displacement), moved := np.empty_like(force))
+        self.first.apply_stiffness(self._interface.there(displacement), moved := np.empty_like(force))
         force[:] = self._interface.back(moved)
 
     def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

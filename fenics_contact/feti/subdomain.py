@@ -48,15 +48,15 @@ class LocalOperator(Protocol):
 
     @property
     def flops(self) -> tuple[int, int]:
-        """Floating point operations of `flex` and of `stiffen`."""
+        """Floating point operations of `apply_flexibility` and of `apply_stiffness`."""
 
-    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
+    def apply_flexibility(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force, shape (n_b,), into ``displacement``."""
 
-    def flex_exactly(self, force: np.ndarray, displacement: np.ndarray) -> None:
+    def apply_flexibility_exactly(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write the same in double precision, however it is stored."""
 
-    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
+    def apply_stiffness(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, or a close approximation, times an interface displacement into ``force``."""
 
     def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -111,18 +111,20 @@ def require_operators_of_each(inverse: TornInverse) -> None:
         rounding = 1e-5 if inverse.is_rounded else 1e-8
         np.testing.assert_allclose(found, np.einsum("kn,kn->k", rows, columns), rtol=rounding)
     size, rounding = np.abs(flexed).max(), 1e-5 if inverse.is_rounded else 1e-10
-    np.testing.assert_allclose(inverse.flex_exactly(forces), flexed, atol=1e-10 * size)
-    np.testing.assert_allclose(inverse.flex(forces), flexed, atol=rounding * size)
-    np.testing.assert_allclose(inverse.stiffen(forces), stiffened, atol=1e-5 * np.abs(stiffened).max())
+    np.testing.assert_allclose(inverse.apply_flexibility_exactly(forces), flexed, atol=1e-10 * size)
+    np.testing.assert_allclose(inverse.apply_flexibility(forces), flexed, atol=rounding * size)
+    np.testing.assert_allclose(
+        inverse.apply_stiffness(forces), stiffened, atol=1e-5 * np.abs(stiffened).max()
+    )
     across = np.round(random.normal(size=(4, len(forces)), scale=0.4))
     across[1] = -across[0]
-    expected = [row @ inverse.flex_exactly(row) for row in across]
+    expected = [row @ inverse.apply_flexibility_exactly(row) for row in across]
     found = inverse.row_flexibility(csr_matrix(across))
     np.testing.assert_allclose(found, expected, rtol=1e-5 if inverse.is_rounded else 1e-8)
 
 
 def _flexed(operator: Any, force: np.ndarray) -> np.ndarray:
-    operator.flex_exactly(force, found := np.empty_like(force))
+    operator.apply_flexibility_exactly(force, found := np.empty_like(force))
     return found
 
 

@@ -83,10 +83,10 @@ def test_flexing_is_the_inverse_seen_from_the_interface(cell: str, kind: type) -
     b = np.flatnonzero(surface(subdomain))
     operator = keep(kind, subdomain, b)
     inverse = np.column_stack([operator.invert(unit)[b] for unit in np.eye(subdomain.mesh.size)[b]])
-    F = columns(operator.flex_exactly, len(b))
+    F = columns(operator.apply_flexibility_exactly, len(b))
     assert abs(F - inverse).max() < 1e-10 * abs(inverse).max()
     rounding = 1e-5 if kind is CompactOperator else 1e-15
-    assert abs(columns(operator.flex, len(b)) - F).max() <= rounding * abs(F).max()
+    assert abs(columns(operator.apply_flexibility, len(b)) - F).max() <= rounding * abs(F).max()
     rows = sp.random(7, len(b), density=0.1, random_state=3, format="csr")
     expected = np.einsum("ij,jk,ik->i", rows.toarray(), F, rows.toarray())
     one_by_one = operator.row_flexibility(rows, 1)  # type: ignore[call-arg]  # the protocol has no such choice
@@ -104,7 +104,7 @@ def test_stiffening_is_the_schur_complement(cell: str, kind: type, rounding: flo
     b, i = np.flatnonzero(marks), np.flatnonzero(~marks)
     K = subdomain.stiffness.toarray()
     expected = K[np.ix_(b, b)] - K[np.ix_(b, i)] @ np.linalg.solve(K[np.ix_(i, i)], K[np.ix_(i, b)])
-    S = columns(keep(kind, subdomain, b).stiffen, len(b))
+    S = columns(keep(kind, subdomain, b).apply_stiffness, len(b))
     assert abs(S - expected).max() < rounding * abs(expected).max()
 
 
@@ -114,10 +114,10 @@ def test_stiffening_has_room_for_displacements_of_any_size(kind: type, size: flo
     subdomain = piece("hexahedron")
     b = np.flatnonzero(surface(subdomain))
     operator, way = keep(kind, subdomain, b), np.linspace(-1.0, 2.0, len(b))
-    operator.stiffen(way, force := np.empty(len(b)))
-    operator.stiffen(size * way, other := np.empty(len(b)))
+    operator.apply_stiffness(way, force := np.empty(len(b)))
+    operator.apply_stiffness(size * way, other := np.empty(len(b)))
     np.testing.assert_allclose(other / size, force, rtol=1e-5, atol=1e-5 * abs(force).max())
-    operator.stiffen(0.0 * way, other)
+    operator.apply_stiffness(0.0 * way, other)
     assert not other.any()
 
 
@@ -140,7 +140,7 @@ def test_an_interface_extends_with_the_least_energy(cell: str, kind: type) -> No
 def test_an_interface_that_is_everything_leaves_no_inside(kind: type) -> None:
     subdomain = piece("hexahedron", cells=1)
     operator = keep(kind, subdomain, np.arange(subdomain.mesh.size))
-    S = columns(operator.stiffen, subdomain.mesh.size)
+    S = columns(operator.apply_stiffness, subdomain.mesh.size)
     K = subdomain.stiffness.toarray()
     assert abs(S - K).max() < 1e-6 * abs(K).max()
     right = K @ np.random.default_rng(1).standard_normal(len(K))
@@ -265,11 +265,13 @@ def test_the_energy_of_a_displacement_is_that_of_double_precision(kind: LocalKin
     rigid = (system.kernel @ rng.normal(size=system.kernel.shape[1]))[system.inverse.interface]
     for share in (1.0, 1e-3):
         bent = share * rng.normal(size=len(rigid))
-        energy = bent @ exact.stiffen(bent)
+        energy = bent @ exact.apply_stiffness(bent)
         assert energy > 0.0
         found, force = system.inverse.energy(unit * (rigid + bent))
         assert found == pytest.approx(unit**2 * energy, rel=1e-9)
-        np.testing.assert_allclose(force, unit * exact.stiffen(bent), rtol=0, atol=1e-9 * np.abs(force).max())
+        np.testing.assert_allclose(
+            force, unit * exact.apply_stiffness(bent), rtol=0, atol=1e-9 * np.abs(force).max()
+        )
     assert system.inverse.energy(np.zeros_like(rigid))[0] == 0.0
 
 
