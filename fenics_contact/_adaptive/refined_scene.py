@@ -52,8 +52,7 @@ def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefineme
     unknown = sorted(set(marked) - set(scene.bodies))
     if unknown:
         raise InvalidInputError(
-            f"marked must name bodies of the scene, {sorted(scene.bodies)}, got {unknown[0]!r}: take one "
-            "of these"
+            f"marked must name bodies, got {unknown[0]!r}: take one of {sorted(scene.bodies)}"
         )
     require_refinable(scene.constraints, scene.bodies)
     bodies, refinements = dict(scene.bodies), {}

@@ -82,8 +82,7 @@ def check_supports_of_sides(
             sector = scene.ties[int(tied.pair[which[held[loose[0]]]])]
             raise InvalidInputError(
                 f"supports must hold both sides of a sector alike, but of {sector.place} they hold "
-                f"{counted(len(loose), 'node')} of the slave where the master is free: give the support to "
-                "the other side, too, or to neither"
+                f"{counted(len(loose), 'node')} of the slave where the master is free: support both or none"
             )
 
 

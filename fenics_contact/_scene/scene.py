@@ -213,8 +213,7 @@ class LoadStep:
         """Raise if loads are functions of time and no finite time is given."""
         if not np.isfinite(self._given.get("time", 0.0)):
             raise InvalidInputError(
-                f"time of LoadStep {self.name!r} must be a finite number or None, got {self.time!r}: give "
-                "the time at its end"
+                f"time of LoadStep {self.name!r} must be a finite number or None, got {self.time!r}: omit it"
             )
         if "time" not in self._given and (callable(self.loads) or callable(self.supports)):
             raise InvalidInputError(

@@ -353,8 +353,7 @@ class MeshFile(Placed):
         if self.deck:
             if self._gives("bodies", "surfaces", "labels", "size", "sizes", "order", "corners_only"):
                 raise InvalidInputError(
-                    f"a mesh with deck = true has the bodies and surfaces that {self.file!r} names: omit "
-                    "other keys"
+                    f"a mesh with deck = true has bodies and surfaces of {self.file!r} alone: omit other keys"
                 )
             return read_deck_mesh(path, comm)
         if kind in (*CAD, ".msh", ".xdmf") and self._gives("labels", "corners_only"):

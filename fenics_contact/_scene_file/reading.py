@@ -603,8 +603,7 @@ def _text_of(path: Path) -> str:
         ) from error
     if large:
         raise InvalidInputError(
-            f"the scene file '{path}' must have at most {LARGEST // 10**6} MB: put meshes into their own "
-            "files"
+            f"the scene file '{path}' must have at most {LARGEST // 10**6} MB: give meshes own files"
         )
     try:
         return content.decode("utf-8").replace("\r\n", "\n")

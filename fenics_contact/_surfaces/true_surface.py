@@ -532,6 +532,5 @@ def _check_across(
         raise InvalidInputError(
             f"each point of a facet needs one point of its shape above it, but at {np.count_nonzero(along)} "
             f"of {len(along)} points {type(shape).__name__} is nearly parallel to the normal of the facets, "
-            f"the first at ({where}): refine the mesh there, give the surface another shape, or let the pair "
-            "take geometry='reconstructed'"
+            f"the first at ({where}): refine it there, or let the pair take geometry='reconstructed'"
         )

@@ -180,8 +180,7 @@ class ConstraintRows(Joint):
             ).ravel()
             if (motions > near * abs(moving).max()).any():
                 raise InfeasibleError(
-                    f"{self._named(int(np.argmax(motions)))} acts on no body that deforms: prescribe "
-                    "components"
+                    f"{self._named(int(np.argmax(motions)))} acts on no body that deforms: use Support"
                 )
 
     def _left(self, values: np.ndarray | sp.csr_matrix) -> np.ndarray:

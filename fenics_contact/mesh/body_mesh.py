@@ -154,8 +154,7 @@ def checked_regions(regions: Mapping[str, ArrayLike], n_cells: int) -> dict[str,
         if array.size == 0 or array[0] < 0 or array[-1] >= n_cells:
             given = f"{array[0]} to {array[-1]}" if array.size else "none"
             raise InvalidInputError(
-                f"region '{name}' must hold cell numbers from 0 to {n_cells - 1}, got {given}: omit it if "
-                "empty"
+                f"region '{name}' must hold cell numbers below {n_cells}, got {given}: omit it if empty"
             )
         taken = np.union1d(array[owner[array] >= 0], array[1:][np.diff(array) == 0])
         if taken.size:

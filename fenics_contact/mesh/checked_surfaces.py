@@ -116,6 +116,5 @@ def _check_once(name: str, facets: np.ndarray, numbers: np.ndarray) -> None:
     if twice.size:
         raise InvalidInputError(
             f"surface '{name}' must list every facet once, {twice.size} of {first.size} are listed more "
-            f"often, such as that with nodes {facets[first[twice[0]]].tolist()}: keep one of each, as by "
-            "numpy.unique"
+            f"often, such as that with nodes {facets[first[twice[0]]].tolist()}: keep one of each"
         )

@@ -194,8 +194,7 @@ def _checked_partition(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
     empty = np.flatnonzero(np.bincount(array) == 0)
     if empty.size:
         raise InvalidInputError(
-            f"subdomains must be numbered without holes, number {empty[0]} of {array.max() + 1} is empty: "
-            "renumber"
+            f"subdomains must be numbered without holes, {empty[0]} of {array.max() + 1} is empty: renumber"
         )
     return array.astype(np.int64)
 

@@ -66,7 +66,6 @@ def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> n
         place = ", ".join(f"{x:.6g}" for x in points[face].mean(axis=0))
         raise InvalidInputError(
             f"cells that share a face must lie on its two sides, {np.count_nonzero(same)} faces of {source} "
-            f"have both on one side, first at ({place}): a cell there is flipped over or there twice; mesh "
-            "again"
+            f"have both on one side, first at ({place}), where a cell is flipped or twice: mesh again"
         )
     return turned

@@ -123,8 +123,7 @@ def _require_unfolded(surface: MovedSurface, after: np.ndarray) -> None:
         at = _places(count, axes)[np.argmax(turned)]
         where = ", ".join(f"{name} = {place:.3g}" for name, place in zip("st", at, strict=False))
         raise CadError(
-            f"the surface designed on {surface.design.body!r} folds over itself at {where}: bound its "
-            "movement"
+            f"the surface designed on {surface.design.body!r} folds over itself at {where}: bound its nodes"
         )
 
 

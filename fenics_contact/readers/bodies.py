@@ -315,8 +315,7 @@ def _check_facets_belong(mesh: TaggedMesh, surfaces: Facets) -> None:
                 place = ", ".join(f"{x:.6g}" for x in mesh.points[block[np.argmax(off)]].mean(axis=0))
                 raise InvalidInputError(
                     f"a surface must consist of faces of cells, {np.count_nonzero(off)} of {len(block)} "
-                    f"facets of '{name}' of {mesh.source} are none, first at ({place}): mesh bodies and "
-                    "surfaces together"
+                    f"facets of '{name}' of {mesh.source} are none, first at ({place}): mesh both together"
                 )
 
 

@@ -158,8 +158,7 @@ def refilled(mesh: BodyMesh) -> BodyMesh:
     if mesh.cell_type != "tetrahedron" or mesh.regions or mesh.shapes:
         raise InvalidInputError(
             "a body is refilled with linear tetrahedra and has neither regions nor true shapes, got "
-            f"{mesh.cells_in_words}, regions {sorted(mesh.regions)}, shapes of {sorted(mesh.shapes)}: keep "
-            "its cells"
+            f"{mesh.cells_in_words}, regions {sorted(mesh.regions)}, shapes of {sorted(mesh.shapes)}: keep it"
         )
     facets, _ = boundary_faces(mesh.cells)
     try:

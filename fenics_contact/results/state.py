@@ -175,10 +175,7 @@ def checked_tolerance(tolerance: object) -> float | BalancedTolerance | None:
     if isinstance(tolerance, float | int | np.floating):
         if 0.0 < tolerance < 1.0:
             return float(tolerance)
-        raise InvalidInputError(
-            f"tolerance must lie between 0 and 1, got {float(tolerance):g}: it is a relative residual, "
-            "1e-6 is a good one"
-        )
+        raise InvalidInputError(f"tolerance must lie between 0 and 1, got {float(tolerance):g}: give 1e-6")
     from fenics_contact._accuracy.state_errors import BalancedTolerance  # imported already if one was given
 
     if isinstance(tolerance, BalancedTolerance):

@@ -52,8 +52,7 @@ class ToolResults(dict[str, ToolResult]):
     def __missing__(self, name: str) -> ToolResult:
         """Reject a name that no tool has."""
         raise InvalidInputError(
-            f"tools of the scene are {', '.join(map(repr, self)) or 'none'}, got {name!r}: use one of these "
-            "names"
+            f"tools of the scene are {', '.join(map(repr, self)) or 'none'}, got {name!r}: use one of these"
         )
 
     def __str__(self) -> str:

@@ -151,7 +151,7 @@ def test_a_body_in_two_parts_cannot_be_one_subdomain() -> None:
         (np.zeros(47, dtype=int), r"integers of shape \(48,\), got int64 of shape \(47,\)"),
         (np.zeros(48), r"integers of shape \(48,\), got float64"),
         (np.full(48, -1), "must start at 0, got -1"),
-        (np.full(48, 1), "without holes, number 0 of 2 is empty"),
+        (np.full(48, 1), "without holes, 0 of 2 is empty"),
     ],
 )
 def test_an_array_that_is_no_partition_is_refused(

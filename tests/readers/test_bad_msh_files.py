@@ -174,7 +174,7 @@ def test_surfaces_alone_are_no_solid(tmp_path: Path) -> None:
 def test_a_surface_beside_the_cells_is_refused(tmp_path: Path) -> None:
     cells = [(HEXAHEDRON, 1, range(8)), (QUADRILATERAL, 2, (0, 1, 2, 3)), (QUADRILATERAL, 2, (0, 1, 6, 7))]
     path = write_22(tmp_path / "b.msh", CUBE, cells, {(3, 1): "lug", (2, 2): "cut"})
-    message = r"1 of 2 facets of 'cut' of file .* are none, first at \(0\.5, 0\.5, 0\.5\): mesh bodies"
+    message = r"1 of 2 facets of 'cut' of file .* are none, first at \(0\.5, 0\.5, 0\.5\): mesh both"
     with pytest.raises(InvalidInputError, match=message):
         read_msh(path)
     assert dict(read_msh(path, surfaces=[])["lug"].surfaces) == {}

@@ -127,7 +127,7 @@ def test_cells_listed_left_handed_are_turned(meshio: ModuleType, tmp_path: Path)
 
 def test_a_cell_flipped_over_its_neighbour_is_refused(meshio: ModuleType, tmp_path: Path) -> None:
     cells = {"triangle": [[0, 1, 2], [1, 0, 3]]}  # both above the edge from 0 to 1
-    message = r"1 faces of file .* have both on one side, first at \(0\.5, 0\): a cell there is flipped over"
+    message = r"1 faces of file .* have both on one side, first at \(0\.5, 0\), where a cell is flipped"
     with pytest.raises(InvalidInputError, match=message):
         read_xdmf(written(meshio, tmp_path / "f.xdmf", CUBE[:4], cells))
 

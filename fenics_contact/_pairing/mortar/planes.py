@@ -178,8 +178,7 @@ def check_convex(planes: Planes, chosen: np.ndarray, convex: float = -1e-10) -> 
     if len(bad):
         raise FoldedFacetsError(
             f"mortar coupling needs convex facets on the slave surface, but {len(bad)} are folded or have a "
-            f"re-entrant corner, among them facet {chosen[bad[0]]}: improve the mesh there or take that side "
-            "for the master"
+            f"re-entrant corner, among them facet {chosen[bad[0]]}: mesh it better, or make it the master"
         )
 
 
