@@ -285,7 +285,7 @@ class Loading:
         return any(each.springs.any() for each in self.turned)
 
     @property
-    def loose(self) -> frozenset[str]:
+    def free_tools(self) -> frozenset[str]:
         """Names of the bodies of rigid surfaces with free components."""
         return frozenset(each.surface.body for each in self.turned if each.free.any())
 

@@ -592,7 +592,9 @@ class MovingContact(Contact):
         return min(1.0, FACETS * self._facet / moved) if moved > 0.0 else 1.0
 
     def first(self, load: Loading, displacement: Vector) -> ContactConfiguration:
-        found = self._sliding.at(self._coordinates(load, displacement), None, load.time, None, load.loose)
+        found = self._sliding.at(
+            self._coordinates(load, displacement), None, load.time, None, load.free_tools
+        )
         return self._on_rows(load, found, found.material_points())
 
     def at(self, load: Loading, displacement: Vector, last: ContactConfiguration) -> ContactConfiguration:
@@ -606,14 +608,16 @@ class MovingContact(Contact):
         self, load: Loading, displacement: Vector, known: SlidingPoints | None, start: MaterialPoints
     ) -> ContactConfiguration:
         coordinates = self._coordinates(load, displacement)
-        found = self._sliding.at(coordinates, known, load.time, start, load.loose)
+        found = self._sliding.at(coordinates, known, load.time, start, load.free_tools)
         return self._on_rows(load, found, start.extended(found.material_points()))
 
     def found_again(
         self, load: Loading, displacement: Vector, stored: Mapping[str, np.ndarray]
     ) -> ContactConfiguration:
         coordinates = self._coordinates(load, displacement)
-        return self._on_rows(load, *self._sliding.found_again(stored, coordinates, load.time, load.loose))
+        return self._on_rows(
+            load, *self._sliding.found_again(stored, coordinates, load.time, load.free_tools)
+        )
 
     def _on_rows(self, load: Loading, found: SlidingPoints, start: MaterialPoints) -> ContactConfiguration:
         torn = on_contact_rows(load.torn, found.points, load.prescribed)

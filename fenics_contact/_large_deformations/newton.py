@@ -255,7 +255,7 @@ class _State:
     begin: _Begin
     before: Residuals | None = None  # before the last step
     instead: Configuration | None = None  # where to start from if the first step fails
-    loose: bool = False  # whether the last face did not hold every body
+    floats: bool = False  # whether the last face did not hold every body
     effort: Effort = field(default_factory=Effort)
 
     @property
@@ -263,10 +263,10 @@ class _State:
         """One line for each step."""
         return self.effort.history
 
-    def after(self, line: SolverStep, taken: TangentStep, loose: bool) -> _State:
+    def after(self, line: SolverStep, taken: TangentStep, floats: bool) -> _State:
         """Return it with another step."""
         effort = self.effort.followed_by(Effort((line,), taken.products, 1))
-        return replace(self, instead=None, loose=loose, effort=effort)
+        return replace(self, instead=None, floats=floats, effort=effort)
 
     def is_vain(self, method: TangentNewton) -> bool:
         """Return whether further steps are vain: residuals do not fall, or bodies lose stability meanwhile.
@@ -312,7 +312,7 @@ class _Run:
             raise ConvergenceError(
                 f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
                 f"{counted(len(history), 'step')}: {history[-1] if history else 'no step'}: "
-                f"{HOLD if state.loose else 'take smaller load steps'}",
+                f"{HOLD if state.floats else 'take smaller load steps'}",
                 history,
             )
         return None
@@ -341,13 +341,13 @@ class _Run:
         turned = taken.motions[len(taken.motions) - evaluation.torn.free.count :][:tracked]
         damped = self._damped(state, moved, change, turned)
         # (e) The next state, or the other start if the first step has failed.
-        loose, again = whole and self._forces_known(evaluation), state.instead
+        floats, again = whole and self._forces_known(evaluation), state.instead
         how = "contact solved as a whole" if whole else f"forcing {pace.forcing:.1e}"
         line = self._line(state, damped, taken, [how, *held])
         if (damped.fraction == 1.0 and line.residuals.worst < evaluation.residuals.worst) or again is None:
-            state = state.after(line, taken, loose)
+            state = state.after(line, taken, floats)
             return replace(state, evaluation=damped.point, before=evaluation.residuals)
-        state = state.after(replace(line, note=f"{line.note}, begun again"), taken, loose)
+        state = state.after(replace(line, note=f"{line.note}, begun again"), taken, floats)
         evaluation = self._started(again, state.history)
         return replace(state, evaluation=evaluation, pace=_Pace(self.method.forcing))
 

@@ -108,10 +108,10 @@ def solve_deformed_adjoint(
 def _require_differentiable(state: DeformedState) -> None:
     """Reject free rigid surfaces, and friction that needs more than the start of the load step."""
     torn, contact = state.torn, state.equilibrium.evaluation.contact
-    if loose := state.equilibrium.evaluation.load.loose:
+    if free := state.equilibrium.evaluation.load.free_tools:
         raise InvalidInputError(
             "derivatives of nonlinear scenes need rigid tools and surfaces whose whole motion is prescribed, "
-            f"but that of {sorted(loose)} has free components: prescribe what State.rigid_motions() reports"
+            f"but that of {sorted(free)} has free components: prescribe what State.rigid_motions() reports"
         )
     if len(torn.frictional) == 0:
         return

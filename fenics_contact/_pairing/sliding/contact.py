@@ -127,12 +127,12 @@ class SlidingContact:
         last: SlidingPoints | LastPoints | None = None,
         time: float = 0.0,
         start: MaterialPoints | None = None,
-        loose: frozenset[str] = frozenset(),
+        free_tools: frozenset[str] = frozenset(),
     ) -> SlidingPoints:
         """Return the contact points of the bodies where they lie now. Collective.
 
         `coordinates`: present coordinates of the nodes of all bodies, shape (n_nodes, dim), [length];
-        `loose`: names of tools with free components, whose points need derivatives by their motion.
+        `free_tools`: names of tools with free components, whose points need derivatives by their motion.
         """
         coordinates = np.asarray(coordinates, dtype=np.float64)
         needed = self.scene.points.shape
@@ -148,7 +148,7 @@ class SlidingContact:
                 placements = {**placements, **each.master.placements(each.number, coordinates, time)}
         known = (last or LastPoints.none(needed[1])).points
         before = start or MaterialPoints.none(*needed)
-        moved = Moved(self.scene, coordinates, placements, known, before, loose, self.reach, self.comm)
+        moved = Moved(self.scene, coordinates, placements, known, before, free_tools, self.reach, self.comm)
         parts = [self._found(each, moved) for each in self.meetings]
         points = join_points([part.points for part in parts], self.scene.dim, len(coordinates))
         differential = join_differentials(
@@ -163,13 +163,13 @@ class SlidingContact:
         stored: Mapping[str, np.ndarray],
         coordinates: np.ndarray,
         time: float,
-        loose: frozenset[str] = frozenset(),
+        free_tools: frozenset[str] = frozenset(),
     ) -> tuple[SlidingPoints, MaterialPoints]:
         """Return points that were stored, and where they stood. Collective.
 
-        `coordinates`: the coordinates of then, shape (n_nodes, dim), [length]; `loose` as in `at`.
+        `coordinates`: the coordinates of then, shape (n_nodes, dim), [length]; `free_tools` as in `at`.
         """
-        found = self.at(coordinates, LastPoints.of(stored), time, loose=loose)
+        found = self.at(coordinates, LastPoints.of(stored), time, free_tools=free_tools)
         return found, MaterialPoints.of(stored, len(coordinates))
 
     def _found(self, meeting: SlidingPair, moved: Moved) -> Found:

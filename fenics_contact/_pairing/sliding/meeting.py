@@ -43,7 +43,7 @@ class Moved:
         coordinates: Coordinates of the nodes of all bodies, shape (n_nodes, dim), [length].
         last: Points of nearby coordinates; none at first.
         start: Where nodes were at the start of the step; none at first.
-        loose: Names of masters with free components, whose points need derivatives by their motion.
+        free_tools: Names of masters with free components, whose points need derivatives by their motion.
         reach: Distance beyond which nodes need no point, [length].
     """
 
@@ -52,7 +52,7 @@ class Moved:
     placements: Placements
     last: Known
     start: MaterialPoints
-    loose: frozenset[str]
+    free_tools: frozenset[str]
     reach: float
     comm: MPI.Comm
 

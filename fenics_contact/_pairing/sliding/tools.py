@@ -26,14 +26,14 @@ class OnTool(OnObstacle):
         return bool(pair.tool)
 
     def _found(self, moved: Moved) -> Found:
-        """Return points; those of a loose tool are like those on a body, of the nodes that carry it.
+        """Return points; those of a free tool are like those on a body, of the nodes that carry it.
 
         At the foot Y of a point on the tool these have affine weights w(Y), so that its surface S = Σ w_j x_j
         is one of patches: with orthonormal tangents t_a, S,_a = t_a, W,_a = t_a·∂w/∂Y, and n·S,_ab = −D₀ with
         the curvature D₀ = D (I − r D)⁻¹ of the surface at Y, D being that of the distance r.
         """
         found = super()._found(moved)
-        if self.master.pair.master.name not in moved.loose:
+        if self.master.pair.master.name not in moved.free_tools:
             return found
         points, differential, coordinates = found.points, found.differential, moved.coordinates
         body, nodes = self.master.body, self.master.nodes
