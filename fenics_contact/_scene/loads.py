@@ -139,7 +139,7 @@ def _require_area(scene: Around, name: str, surface: str) -> None:
     body = scene.bodies[name]
     if body.on_axis[body.mesh.surfaces[surface]].all():
         raise InvalidInputError(
-            f"a load needs an area, surface {surface!r} of body {name!r} lies on the axis: take another"
+            f"a load needs an area, {surface!r} of body {name!r} lies on the axis of revolution: take another"
         )
 
 

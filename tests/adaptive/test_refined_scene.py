@@ -58,7 +58,7 @@ def test_a_bolt_is_cut_again_on_its_refined_mesh():
 
 
 def test_unknown_bodies_are_refused():
-    with pytest.raises(InvalidInputError, match=r"bodies of the scene, \['lower', 'upper'\], got 'lwoer'"):
+    with pytest.raises(InvalidInputError, match=r"got 'lwoer': take one of \['lower', 'upper'\]"):
         refine_scene(two_blocks(), {"lwoer": [0]})
 
 

@@ -140,5 +140,5 @@ def test_what_a_scene_file_cannot_say_is_refused(tmp_path: Path) -> None:
 def test_a_mesh_that_is_a_deck_has_no_other_keys(tmp_path: Path) -> None:
     files = write_scene_file(read_deck(deck(tmp_path, DECKS["a tie"])), tmp_path / "scene.toml")
     files[0].write_text(files[0].read_text().replace("deck = true", 'deck = true\nsurfaces = ["FEET"]'))
-    with pytest.raises(InvalidInputError, match="a mesh with deck = true has the bodies and surfaces that"):
+    with pytest.raises(InvalidInputError, match="a mesh with deck = true has bodies and surfaces of"):
         read_scene_file(files[0], MPI.COMM_SELF).scene

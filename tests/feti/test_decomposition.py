@@ -59,7 +59,7 @@ def test_a_subdomain_that_does_not_hang_together_is_refused() -> None:
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [(lambda p: p + 1, "number 0 of 9 is empty: renumber"), (lambda p: 0.5 * p, "integers")],
+    [(lambda p: p + 1, "0 of 9 is empty: renumber"), (lambda p: 0.5 * p, "integers")],
 )
 def test_a_partition_that_does_not_count_from_zero_is_refused(change: object, message: str) -> None:
     scene, partitions = lone_block("hexahedron")
