@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import cast
 
 import numpy as np
 import scipy.linalg
@@ -23,6 +22,7 @@ from fenics_contact.feti.decomposition import DualNumbering
 from fenics_contact.feti.inverse import LocalKind, TornInverse
 from fenics_contact.feti.kernel_basis import TornModes, whole_motions
 from fenics_contact.feti.reduced_coarse import Elimination
+from fenics_contact.feti.soft_motions import SoftMotions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import NO_ELIMINATION, CoarseSpace
@@ -155,6 +155,7 @@ class DualSystem:
     kernel: TornModes
     unheld: sp.csr_matrix
     points: sp.csr_matrix
+    preconditioner: DirichletPreconditioner
     _unheld_points: np.ndarray
     _bent: np.ndarray
     _B_interface: sp.csr_matrix
@@ -219,6 +220,7 @@ class DualSystem:
     def _take_over(self, previous: DualSystem, timer: PhaseTimer) -> None:
         """Use the operators of an earlier system with the present load. Collective."""
         self._B_interface, self._Bt_interface = previous._B_interface, previous._Bt_interface
+        self.preconditioner = previous.preconditioner
         self.kernel, self.unheld = previous.kernel, previous.unheld
         self.points, self._unheld_points = previous.points, previous._unheld_points
         self._require_unloaded()
@@ -256,7 +258,7 @@ class DualSystem:
             if torn.groups.compliance.any():
                 preconditioner.soften(torn.compliance.soft, torn.compliance.constant)
             diagonal, supported = self._diagonal()
-            scaling = self._scaling(coarse)
+            self.preconditioner, scaling = preconditioner, self._scaling(coarse)
         nothing = np.zeros(len(torn.numbering.owned))
         operator, exact = self._operators
         self.problem = DualProblem(
@@ -266,7 +268,7 @@ class DualSystem:
             coarse,
             self.torn.layout,
             diagonal,
-            preconditioner,
+            self._soft_motions(coarse, scaling.factor).preconditioner(preconditioner),
             scaling,
             self.reach,
             supported,
@@ -328,11 +330,6 @@ class DualSystem:
     def interface_jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a displacement of the interface, (n_interface,), owned, [length]. Collective."""
         return self.torn.numbering.to_owned(self._B_interface @ displacement)
-
-    @property
-    def preconditioner(self) -> DirichletPreconditioner:
-        """The preconditioner of the unscaled problem."""
-        return cast(DirichletPreconditioner, self.problem.preconditioner)
 
     def displacement(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return u = K⁺(f − Bᵀλ) + R α on this rank's torn dofs, [length]. Collective.
@@ -500,6 +497,16 @@ class DualSystem:
         low = numbering.comm.allreduce(factor.min(initial=np.inf), op=MPI.MIN)
         high = numbering.comm.allreduce(factor.max(initial=0.0), op=MPI.MAX)
         return Unscaled() if high - low <= 1e-6 * high else Scaling.build(factor / high, coarse)
+
+    def _soft_motions(self, coarse: CoarseSpace, factor: np.ndarray | float) -> SoftMotions:
+        """Return the motions that foundations resist, with those that float, in scaled rows. Collective."""
+        B, numbering, comm = self._B_interface, self.torn.numbering, self.torn.numbering.comm
+        flexible = factor**2 * numbering.to_owned(np.asarray(B.multiply(B) @ self._compliance()))
+        glued = flexible[numbering.owned < self.torn.n_gluing]
+        total, count = comm.allreduce(np.array([glued.sum(), len(glued)]))
+        stiffest = max((part.typical_stiffness for part in self.torn.subdomains), default=0.0)
+        typical = total / (max(count, 1.0) * comm.allreduce(stiffest, op=MPI.MAX))
+        return SoftMotions.of(self.torn.subdomains, self._B, numbering, coarse.matrix, float(typical), factor)
 
     def _diagonal(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the diagonal of F on contact rows, one elsewhere, and marks of filled rows. Collective."""

@@ -65,3 +65,13 @@ def separated(
     free = np.linalg.qr(np.linalg.solve(scale, vectors[:, ~held]))[0]
     # What is resisted is all that is across the others.
     return np.linalg.svd(np.eye(len(values)) - free @ free.T)[0][:, : held.sum()], free
+
+
+def by_resistance(stiffness: sp.csr_matrix, modes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return those of some motions, (n, k), that a stiffness leaves free, the others, and RᵀK R of these."""
+    if not stiffness.nnz:
+        return modes, modes[:, :0], np.zeros(0)
+    resisted, free = separated(stiffness, modes)
+    basis = np.linalg.qr(modes @ resisted)[0]
+    values, vectors = np.linalg.eigh(basis.T @ (stiffness @ basis))
+    return modes @ free, basis @ vectors, values

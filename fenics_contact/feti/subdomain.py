@@ -29,7 +29,7 @@ from fenics_contact._scene.loads import (
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.following import AnyFollowing, Following
-from fenics_contact.feti.foundations import foundation_stiffness, separated
+from fenics_contact.feti.foundations import by_resistance, foundation_stiffness
 from fenics_contact.feti.nearby import ToleranceIndex
 from fenics_contact.materials.elastic import Material
 from fenics_contact.mesh.collapsed import expanded
@@ -207,7 +207,8 @@ class Subdomain:
     """A subdomain with its matrices for one geometry and one load.
 
     Those that differ only in their loads share one `matrix`. `load`: f_s; `kernel`: R_s: zero-energy modes as
-    columns; `typical_stiffness`: mean diagonal entry of K_s.
+    columns; `typical_stiffness`: mean diagonal entry of K_s without foundations; `resisted`: motions that
+    foundations alone resist, as columns, shape (dim n, r); `resistance`: RᵀK R of each of these, shape (r,).
     """
 
     mesh: SubdomainMesh
@@ -219,6 +220,8 @@ class Subdomain:
     kernel: np.ndarray
     typical_stiffness: float
     matrix: CachedMatrix
+    resisted: np.ndarray
+    resistance: np.ndarray
     springs: tuple[float, ...] = ()
 
     @property
@@ -468,12 +471,13 @@ def _with_stiffness(
     K = matrix.get()
     _check_finite(K.data, mesh)
     kernel = kernel_of_body(body, points, parts.materials).reshape(mesh.size, -1)
-    if bed.nnz:
-        kernel = kernel @ separated(bed, kernel)[1]
+    kernel, resisted, resistance = by_resistance(bed, kernel)
     check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
-    typical = float(K.diagonal().mean())
+    typical = float((K.diagonal() - bed.diagonal()).mean())
     nothing = np.zeros(mesh.size)
-    found = Subdomain(mesh, parts, foundations, (), points, nothing, kernel, typical, matrix, springs)
+    found = Subdomain(
+        mesh, parts, foundations, (), points, nothing, kernel, typical, matrix, resisted, resistance, springs
+    )
     assembled.add(found)
     return found
 

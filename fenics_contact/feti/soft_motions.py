@@ -1,0 +1,154 @@
+"""A coarse space of motions that are resisted, but little: those of subdomains on elastic foundations.
+
+The matrix K of such a subdomain is regular, and the equilibrium G λ = e lacks its rigid motions R, whose
+stiffness S = RᵀK R may be small: without a coarse space for them FETI is not scalable. With K⁺ of the
+subdomain floating, F = F̃ + Gᵀ S⁻¹ G, and springs with forces σ hold it in
+
+    min ½ λᵀF̃ λ + ½ σᵀS⁻¹σ − dᵀλ   subject to   G λ + σ = e,
+
+on which Dirichlet preconditioner and projector work as on any floating subdomains. Without σ, which G λ
+gives, their product is a preconditioner of F itself. In multipliers σ / t with t² = ω f S, where f is a
+typical flexibility of rows, and with T = diag(t),
+
+    a = (G Gᵀ + T²)⁻¹ G r,   y = M (r − Gᵀa),   b = (G Gᵀ + T²)⁻¹ (G y − S a),   z = y − Gᵀ b.
+
+Motions without stiffness are among those of G, with S = 0: they keep their equilibrium, G z = 0.
+
+References:
+    C. Farhat, P.-S. Chen, J. Mandel, A scalable Lagrange multiplier based domain decomposition method for
+    time-dependent problems, Int. J. Numer. Meth. Eng. 38 (1995) 3831-3853.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.libraries import MPI
+from fenics_contact.feti.decomposition import DualNumbering
+from fenics_contact.feti.kernel_basis import TornModes
+from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.qp.coarse import CoarseSpace, gram_matrix, plus
+from fenics_contact.qp.problem import Dependence, FacePreconditioner, Operator, RowsOfFace
+
+#: ω: by how much the springs of soft motions are more flexible than rows are. Forces that cost little energy
+#: in the bodies should not pass into stiff springs; measured between 3 and 10, it hardly matters.
+MORE_FLEXIBLE = 10.0
+#: Motions this many times stiffer than rows hold the subdomain: they need no coarse space.
+FIRM = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class SoftMotions:
+    """The soft motions of all subdomains, with those that float, in the scaled multipliers λ / s.
+
+    `columns`: this rank's owned columns of G s, shape (m, n_owned); `stiffness`: S, zero of motions that
+    float, shape (m,); `flexibility`: f; `factor`: s, owned, or one.
+    """
+
+    comm: MPI.Comm
+    columns: sp.csr_matrix
+    stiffness: np.ndarray
+    flexibility: float
+    factor: np.ndarray | float
+
+    @classmethod
+    def of(
+        cls,
+        subdomains: Sequence[Subdomain],
+        B: sp.csr_matrix,
+        numbering: DualNumbering,
+        floating: sp.csr_matrix,
+        flexibility: float,
+        factor: np.ndarray | float,
+    ) -> SoftMotions:
+        """Return those of this rank's subdomains and its columns of the equilibrium. Collective."""
+        comm = numbering.comm
+        soft = [flexibility * each.resistance < FIRM for each in subdomains]
+        mine = {each.mesh.number: each.resistance[some] for each, some in zip(subdomains, soft, strict=True)}
+        every = {number: own for part in comm.allgather(mine) for number, own in part.items()}
+        numbers = sorted(every)
+        first = np.cumsum([0, *(len(every[number]) for number in numbers)])
+        start = dict(zip(numbers, first.tolist(), strict=False))
+        column = np.concatenate(
+            [np.zeros(0, int), *(start[n] + np.arange(len(own)) for n, own in mine.items())]
+        )
+        entries = np.ones(len(column)), (np.arange(len(column)), column)
+        moved = TornModes(
+            tuple(each.resisted[:, some] for each, some in zip(subdomains, soft, strict=True)),
+            sp.csr_matrix(entries, shape=(len(column), int(first[-1]))),
+        )
+        columns = sp.vstack([floating, numbering.sum_rows(sp.csr_matrix(moved.moved_by(B))).T])
+        columns = (columns @ sp.diags(factor * np.ones(columns.shape[1]))).tocsr()
+        stiffness = np.concatenate([np.zeros(floating.shape[0]), *(every[number] for number in numbers)])
+        return cls(comm, columns, stiffness, flexibility, factor)
+
+    @property
+    def count(self) -> int:
+        """Number of motions that are soft."""
+        return int(np.count_nonzero(self.stiffness))
+
+    def coarse(self, restriction: sp.csr_matrix) -> CoarseSpace:
+        """Return G Z with the inverse of G Z ZᵀGᵀ + T². Collective."""
+        columns = (self.columns @ restriction).tocsr()
+        gram, added = gram_matrix(self.comm, columns), self._added
+        if isinstance(gram, np.ndarray) or self.comm.rank == 0:  # beyond the limit each rank has its share
+            gram = plus(gram, added)
+        return CoarseSpace(self.comm, columns, np.zeros(len(self.stiffness)), gram=gram)
+
+    @cached_property
+    def _added(self) -> sp.csr_matrix:
+        """T², shape (m, m)."""
+        return sp.diags(MORE_FLEXIBLE * self.flexibility * self.stiffness).tocsr()
+
+    def preconditioner(self, inner: FacePreconditioner) -> FacePreconditioner:
+        """Return a preconditioner of floating subdomains as one of these, itself without soft motions."""
+        return TwoLevel(inner, self) if self.count else inner
+
+
+@dataclass(frozen=True, eq=False)
+class TwoLevel:
+    """The preconditioner of all rows."""
+
+    inner: FacePreconditioner
+    motions: SoftMotions
+
+    def __call__(self, residual: np.ndarray) -> np.ndarray:
+        """Return z, owned. Collective."""
+        return self._everywhere(residual)
+
+    @cached_property
+    def _everywhere(self) -> TwoLevelOfFace:
+        every = sp.identity(self.motions.columns.shape[1], format="csr")
+        return TwoLevelOfFace(self.inner, self.motions, every, self.motions.coarse(every))
+
+    def on_face(self, restriction: sp.csr_matrix) -> TwoLevelOfFace:
+        """Return the preconditioner of the face with basis Z, shape (n_owned, n_face). Collective."""
+        inner, motions = self.inner.on_face(restriction), self.motions
+        return TwoLevelOfFace(inner, motions, restriction, motions.coarse(restriction))
+
+
+@dataclass(frozen=True, eq=False)
+class TwoLevelOfFace:
+    """The preconditioner of a face."""
+
+    inner: Operator
+    motions: SoftMotions
+    restriction: sp.csr_matrix
+    coarse: CoarseSpace
+
+    def __call__(self, residual: np.ndarray) -> np.ndarray:
+        """Return z, owned. Collective."""
+        Z, coarse, s = self.restriction, self.coarse, self.motions.factor
+        given = coarse.coefficients(Z.T @ (s * residual))
+        solved = Z.T @ (self.inner(residual - Z @ coarse.transpose(given) / s) / s)
+        left = coarse.solve(coarse.apply(solved) - self.motions.stiffness * given)
+        return np.asarray(s * (Z @ (solved - coarse.transpose(left))))
+
+    def contradiction(self, residual: np.ndarray) -> Dependence | None:
+        """Return what no force on the face's rows changes, see `qp.RowsOfFace`. Collective."""
+        return self.inner.contradiction(residual) if isinstance(self.inner, RowsOfFace) else None
