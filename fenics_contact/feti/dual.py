@@ -26,7 +26,7 @@ from fenics_contact.feti.soft_motions import SoftMotions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import NO_ELIMINATION, CoarseSpace
-from fenics_contact.qp.problem import DualProblem, Operator, Scaling, Unscaled
+from fenics_contact.qp.problem import DualProblem, Operator, Scaling, SprungRows, Unscaled
 
 
 class DirichletPreconditioner:
@@ -200,7 +200,10 @@ class DualSystem:
         bent = self.inverse(torn.load)
         self._bent = bent[self.inverse.interface]
         rhs = self.jump(bent) - torn.right
-        self.problem = replace(self.problem, rhs=rhs, compliance=torn.compliance.contact, given=torn.right)
+        springs = SprungRows(torn.compliance.soft, torn.compliance.constant)
+        self.problem = replace(
+            self.problem, rhs=rhs, compliance=torn.compliance.contact, springs=springs, given=torn.right
+        )
 
     def _inverse(
         self, torn: TornSystem, condensations: Condensations, kind: LocalKind, known: TornInverse | None

@@ -6,14 +6,14 @@ the distances and slips at which they were before anything moved, as far as they
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.problem import NO_SPRINGS, DualProblem
 from fenics_contact.qp.reductions import Vector, global_max
 from fenics_contact.qp.rigid_motions import RigidMotionCorrection
 
@@ -44,7 +44,7 @@ class LooseMotions:
         none = cls(np.zeros((problem.coarse.m, 0)), np.zeros((0, 0)), nothing, nothing, marks, 0.0)
         if problem.given is None:
             return none
-        correction = RigidMotionCorrection.build(problem)
+        correction = RigidMotionCorrection.build(replace(problem, springs=NO_SPRINGS))  # springs hold, too
         if correction.motions.shape[1] == 0:
             return none
         layout, comm = problem.layout, problem.comm
