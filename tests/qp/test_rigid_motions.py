@@ -6,9 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Scene,
+    Spring,
+    Support,
+    Surface,
+    TotalForce,
+    Tresca,
+    solve_scene,
+)
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.qp import DualProblem, FaceNewton, Smalse, solve
 from fenics_contact.qp.cones import CoulombLaw, Proportional, TrescaLaw
+from fenics_contact.qp.problem import NO_SPRINGS
 from fenics_contact.qp.rigid_motions import RigidMotionCorrection, _Springs
 from fenics_contact.qp.solution import contact_step
 from tests.qp.torn_bricks import Bricks, torn_problem
@@ -123,3 +138,38 @@ def test_bodies_that_were_moved_apart_come_together_again():
     found = solve(apart, None, FaceNewton(), before, friction_coefficient=mu_f)
     assert np.abs(found.multiplier - before.multiplier).max() < 1e-5 * np.abs(before.multiplier).max()
     assert found.products < 10
+
+
+def test_springs_let_a_body_come_to_rest_as_they_are():
+    """A body on springs and a face floats: its motion balances the load with their linear forces."""
+    lower, upper = block((0, 0, 0), (2, 2, 1), (4, 4, 2)), block((0, 0, 1), (1.5, 2, 2), (3, 4, 2))
+    steel = IsotropicElasticity(2.1e5, 0.3)
+    springs = [
+        Spring(Surface("upper", "x0"), (-1, 1, 1.5), (400.0, 100.0, 0.1)),
+        Spring(Surface("upper", "y1"), (0.7, 4, 1.5), (10.0, 200.0, 0.0)),
+    ]
+    scene = Scene(
+        {"lower": Body(lower, steel), "upper": Body(upper, steel)},
+        [Support("lower", "z0")],
+        [TotalForce("upper", "z1", (80.0, 20.0, -1000.0))],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Tresca(30.0))],
+        springs=springs,
+    )
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
+    assert state.solution.products < 80  # 300 where springs counted as rows that hold
+    problem = state.dual.problem
+    sprung = problem.springs.rows
+    correction = RigidMotionCorrection.build(problem)
+    assert len(sprung) == 5
+    assert correction.motions.shape[1] == 6
+    assert RigidMotionCorrection.build(replace(problem, springs=NO_SPRINGS)).motions.shape[1] < 6
+    rng, law = np.random.default_rng(1), state.torn.law
+    multiplier = problem.coarse.particular() + 10.0 * rng.standard_normal(problem.layout.size)
+    residual = problem.operator(multiplier) - problem.rhs
+    step = contact_step(problem.layout, problem.diagonal)
+    motion = RigidMotionCorrection.build(problem.with_law(law))(multiplier, residual, step)
+    step[sprung] = 1.0 / problem.springs.compliance
+    trial = multiplier - step * (residual - problem.coarse.transpose(motion))
+    force = law.feasible(trial).project(trial)
+    missing = correction.motions.T @ (problem.coarse.matrix @ force - problem.coarse.load)
+    assert np.abs(missing).max() < 1e-6 * np.abs(problem.coarse.load).max()

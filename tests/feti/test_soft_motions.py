@@ -1,0 +1,148 @@
+"""Subdomains on elastic foundations are as easily glued as others, however soft the foundations are."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Coulomb,
+    ElasticFoundation,
+    Scene,
+    Support,
+    Surface,
+    Tie,
+    Traction,
+    box_partition,
+    solve_scene,
+)
+from fenics_contact.feti.soft_motions import SoftMotions, TwoLevel
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.results.linear_state import LinearState
+
+YOUNG = 2.1e5
+STEEL = IsotropicElasticity(YOUNG, 0.3)
+
+
+@cache
+def cube(n: int, stiffness: float) -> LinearState:
+    """A cube of n³ subdomains, H/h = 4, on a foundation under its lower side, or clamped there."""
+    mesh = block((0, 0, 0), (1, 1, 1), (4 * n,) * 3)
+    held = {"supports": [Support("cube", "z0")]}
+    if np.isfinite(stiffness):
+        held = {"supports": [], "foundations": [ElasticFoundation("cube", "z0", (stiffness,) * 3)]}
+    scene = Scene({"cube": Body(mesh, STEEL)}, loads=[Traction("cube", "z1", (20.0, 0.0, -50.0))], **held)
+    return solve_scene(
+        scene, MPI.COMM_SELF, partitions={"cube": box_partition(mesh, (n,) * 3)}, tolerance=1e-6
+    )
+
+
+@pytest.mark.parametrize("share", [5.0, 0.5, 5e-3, 5e-5, 5e-7])
+@pytest.mark.parametrize("n", [2, 3])
+def test_soft_foundations_cost_at_most_little_more_than_clamps(n: int, share: float) -> None:
+    """Without their coarse space 51 products at 27 subdomains, and 78 at 64, against 13 and 14."""
+    clamped = cube(n, np.inf).solution.products
+    assert cube(n, share * YOUNG).solution.products <= 1.3 * clamped
+
+
+def test_firm_foundations_are_left_as_they_are() -> None:
+    state = cube(2, 1e6 * YOUNG)
+    assert state.dual.problem.preconditioner is state.dual.preconditioner
+    assert all(part.resisted.shape[1] in (0, 6) for part in state.torn.subdomains)
+
+
+def test_the_answer_is_that_of_one_subdomain() -> None:
+    """By one factor, without gluing: displacements and the force of the foundation."""
+    mesh, found = block((0, 0, 0), (1, 1, 1), (6, 6, 6)), []
+    scene = Scene(
+        {"cube": Body(mesh, STEEL)}, [], [Traction("cube", "z1", (20.0, 0.0, -50.0))],
+        foundations=[ElasticFoundation("cube", "z0", (40.0, 90.0, 70.0))],
+    )  # fmt: skip
+    for parts in ((1, 1, 1), (2, 2, 2)):
+        state = solve_scene(
+            scene, MPI.COMM_SELF, partitions={"cube": box_partition(mesh, parts)}, tolerance=1e-12
+        )
+        found.append(state.gather_displacement("cube"))
+        assert state.balance().imbalance < 1e-9
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-8, atol=1e-8 * np.abs(found[0]).max())
+
+
+def test_the_preconditioner_keeps_the_equilibrium_of_what_floats_and_bounds_the_spectrum() -> None:
+    state = cube(2, 1e-2 * YOUNG)
+    problem = state.dual.problem
+    precondition, identity = problem.preconditioner, np.eye(problem.layout.size)
+    assert isinstance(precondition, TwoLevel)
+    assert precondition.motions.count == 6 * 4
+    M = np.column_stack([precondition(column) for column in identity])
+    assert np.abs(M - M.T).max() < 1e-6 * np.abs(M).max()  # S is in single precision
+    assert np.abs(problem.coarse.matrix @ M).max() < 1e-12 * np.abs(M).max()
+    F = np.column_stack([problem.operator(column) for column in identity])
+    values = np.linalg.eigvals(M @ F).real
+    values = values[values > 1e-3]
+    assert len(values) == problem.layout.size - problem.coarse.m
+    assert values.max() < 3.0 * values.min()  # 5000 times without the coarse space
+
+
+def test_motions_are_separate_and_have_their_stiffness() -> None:
+    state = cube(2, 3.0)
+    resting = [part for part in state.torn.subdomains if part.resisted.shape[1]]
+    assert len(resting) == 4
+    for part in resting:
+        assert part.kernel.shape[1] == 0
+        R = part.resisted
+        np.testing.assert_allclose(R.T @ R, np.eye(6), atol=1e-12)
+        np.testing.assert_allclose(R.T @ (part.stiffness @ R), np.diag(part.resistance), atol=1e-9)
+        assert part.typical_stiffness < part.stiffness.diagonal().mean()
+
+
+@pytest.mark.parametrize(("law", "most"), [((), 30), ((Coulomb(0.3),), 100)])
+def test_contact_on_a_soft_bed_takes_few_products(law, most: int) -> None:
+    """Without the coarse space 67 and 426 on the soft bed, 20 and 45 on the firm one."""
+    low, up = block((0, 0, 0), (1, 1, 1), (8, 8, 8)), block((0.1, 0.1, 1.0), (0.9, 0.9, 1.6), (6, 6, 4))
+    parts = {"low": box_partition(low, (2, 2, 2)), "up": box_partition(up, (2, 2, 1))}
+    products, pressed = [], []
+    for stiffness in (1e7, 10.0):
+        scene = Scene(
+            {"low": Body(low, STEEL), "up": Body(up, STEEL)},
+            [Support("up", "z1", (0.001, 0.0, -0.002))],
+            [],
+            [ContactPair(Surface("up", "z0"), Surface("low", "z1"), *law)],
+            foundations=[ElasticFoundation("low", "z0", (stiffness,) * 3)],
+        )
+        state = solve_scene(scene, MPI.COMM_SELF, partitions=parts, tolerance=1e-8)
+        products.append(state.solution.products)
+        pressed.append(state.contact.normal_force.sum())
+    assert max(products) <= most
+    assert pressed[1] == pytest.approx(10.0 * 0.002, rel=1e-3)
+
+
+def test_a_stiff_body_beside_does_not_spoil_it() -> None:
+    """Rows are scaled between parts of different stiffness, and motions with them."""
+    soft, hard = block((0, 0, 0), (1, 1, 1), (8, 8, 8)), block((0, 0, 1), (1, 1, 2), (8, 8, 8))
+    parts = {name: box_partition(mesh, (2, 2, 2)) for name, mesh in (("soft", soft), ("hard", hard))}
+    products = []
+    for stiffness in (5.0 * YOUNG, 1e-3 * YOUNG):
+        scene = Scene(
+            {"soft": Body(soft, STEEL), "hard": Body(hard, IsotropicElasticity(1e3 * YOUNG, 0.3))},
+            [],
+            [Traction("hard", "z1", (20.0, 0.0, -50.0))],
+            ties=[Tie(Surface("hard", "z0"), Surface("soft", "z1"))],
+            foundations=[ElasticFoundation("soft", "z0", (stiffness,) * 3)],
+        )
+        products.append(solve_scene(scene, MPI.COMM_SELF, partitions=parts, tolerance=1e-6).solution.products)
+    assert products[1] <= products[0] + 2
+
+
+def test_none_are_none() -> None:
+    state = cube(2, np.inf)
+    motions = SoftMotions.of(
+        state.torn.subdomains, state.torn.B, state.torn.numbering, state.dual.problem.coarse.matrix, 1.0, 1.0
+    )
+    assert motions.count == 0
+    assert motions.preconditioner(state.dual.preconditioner) is state.dual.preconditioner
