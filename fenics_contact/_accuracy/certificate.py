@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
@@ -314,7 +315,7 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
     # Where a slip is short, removing its part across the friction force costs less energy than keeping it.
     statuses = known.statuses
     across = statuses.slip & (step * slid < known.slip_bound)
-    rows = _Rows(system, known, statuses.closed, statuses.stick, across)
+    rows = _Rows(system, known, statuses.closed, statuses.stick, across, soft_rows(system))
     closing = _close(rows, residual, cancelled)
     if closing.left > UNLIFTED:  # a node of two pairs may be set to stick where it should close
         nothing = np.zeros_like(across)
@@ -360,7 +361,8 @@ def _close(rows: _Rows, residual: Vector, cancelled: float, refinements: int = 1
 class _Rows:
     """The rows that a correction closes: all equality rows and some of contacts.
 
-    `across`: discs whose slip across the friction force is removed, owned.
+    `across`: discs whose slip across the friction force is removed, owned; `stretched`: soft rows that are
+    left as they are, positions among the owned ones.
     """
 
     system: DualSystem
@@ -368,12 +370,16 @@ class _Rows:
     closed: Marks
     stick: Marks
     across: Marks
+    stretched: npt.NDArray[np.int64]
 
     @cached_property
     def restriction(self) -> sp.csr_matrix:
         """Z with orthonormal columns, shape (size, n_face), owned."""
         layout = self.system.problem.layout
-        return basis(layout, self.closed, self.stick, self.across, self.known.multiplier)
+        rows = basis(layout, self.closed, self.stick, self.across, self.known.multiplier)
+        # The first columns are those of the rows of equality, in their order.
+        left = np.searchsorted(layout.equality, self.stretched)
+        return rows[:, np.setdiff1d(np.arange(rows.shape[1]), left)]
 
     def wanted(self, residual: Vector) -> Vector:
         """Return Zᵀ r, shape (n_face,)."""
@@ -424,7 +430,8 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
 
     Surfaces that give way by C(λ) count as touching where the gap is −C(λ): the terms of the second sum are
     then φ(δ) + Φ(λ_N) − λ_N δ with Φ' = C, its conjugate φ and the closure δ of v, at most λ_N (c − B v +
-    C(λ))_N.
+    C(λ))_N. Rows of equality that give way more than bodies keep their lengths in v, at the energy ½ (B v −
+    c − C λ)² / C.
 
     The bound is for Tresca's problem with the slip bounds of the solution. Where these are given, that is the
     actual problem; and it is infinite where no multiplier within them balances the load. Where they follow
@@ -452,8 +459,10 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     residual = residual + problem.compliance.given_way(known.multiplier)
     if moves:
         residual = known.statuses.settled(residual)
+    residual = _hung(system, known, residual)
     lifted = lift(system, known, residual, _cancelled(problem, solution))
     rest = _pressed(problem, known, lifted.residual) + _rubbed(problem, known, lifted.residual)
+    rest += _stretched(system, lifted.residual)
     gap = 0.5 * lifted.energy + rest
     radius = 0.5 * float(np.sqrt(lifted.energy + 4.0 * rest))
     bound = max(_distances(system, solution, lifted)) + radius + moved
@@ -478,6 +487,34 @@ def _cancelled(problem: DualProblem, solution: DualSolution) -> float:
     """Return the norm of the displacements that cancel in r. Collective."""
     moved = np.abs(solution.product - problem.rhs).max(initial=0.0)
     return global_max(problem.comm, max(moved, np.abs(problem.rhs).max(initial=0.0)))
+
+
+def soft_rows(system: DualSystem) -> npt.NDArray[np.int64]:
+    """Return the rows that give way more than the bodies there: closing them would deform bodies."""
+    given = system.problem.compliant
+    return given.rows[given.compliance > system.flexibility[given.rows]]
+
+
+def _hung(system: DualSystem, known: Admissible, residual: Vector) -> Vector:
+    """Return r after the rigid motions that close rows best, soft ones by what they resist. Collective.
+
+    Where all rows counted alike, bodies that soft rows hold would be bent instead of moved.
+    """
+    problem, given = system.problem, system.problem.compliant
+    if global_max(problem.comm, float(len(soft_rows(system)))) == 0.0:
+        return residual
+    weight = scaling_factors(problem) ** 2
+    weight[given.rows] *= np.minimum(system.flexibility[given.rows] / given.compliance, 1.0)
+    rows = (sp.diags(np.sqrt(weight)) @ known.statuses.free).tocsr()
+    coarse = problem.coarse.restricted(rows)
+    return residual - problem.coarse.transpose(coarse.fitted(rows.T @ residual))
+
+
+def _stretched(system: DualSystem, residual: Vector) -> float:
+    """Return Σ ½ r² / C, the energy between length and force of soft rows. Collective."""
+    given, soft = system.problem.compliant, soft_rows(system)
+    compliance = given.compliance[np.searchsorted(given.rows, soft)]
+    return float(global_sum(system.problem.comm, 0.5 * (residual[soft] @ (residual[soft] / compliance)))[0])
 
 
 def _pressed(problem: DualProblem, known: Admissible, residual: Vector) -> float:

@@ -26,7 +26,7 @@ from fenics_contact.feti.soft_motions import SoftMotions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import NO_ELIMINATION, CoarseSpace
-from fenics_contact.qp.problem import DualProblem, Operator, Scaling, SprungRows, Unscaled
+from fenics_contact.qp.problem import CompliantRows, DualProblem, Operator, Scaling, Unscaled
 
 
 class DirichletPreconditioner:
@@ -200,9 +200,9 @@ class DualSystem:
         bent = self.inverse(torn.load)
         self._bent = bent[self.inverse.interface]
         rhs = self.jump(bent) - torn.right
-        springs = SprungRows(torn.compliance.soft, torn.compliance.constant)
+        compliant = CompliantRows(torn.compliance.soft, torn.compliance.constant)
         self.problem = replace(
-            self.problem, rhs=rhs, compliance=torn.compliance.contact, springs=springs, given=torn.right
+            self.problem, rhs=rhs, compliance=torn.compliance.contact, compliant=compliant, given=torn.right
         )
 
     def _inverse(
@@ -503,13 +503,22 @@ class DualSystem:
 
     def _soft_motions(self, coarse: CoarseSpace, factor: np.ndarray | float) -> SoftMotions:
         """Return the motions that foundations resist, with those that float, in scaled rows. Collective."""
-        B, numbering, comm = self._B_interface, self.torn.numbering, self.torn.numbering.comm
-        flexible = factor**2 * numbering.to_owned(np.asarray(B.multiply(B) @ self._compliance()))
-        glued = flexible[numbering.owned < self.torn.n_gluing]
-        total, count = comm.allreduce(np.array([glued.sum(), len(glued)]))
+        numbering = self.torn.numbering
+        glued = (factor**2 * self.flexibility)[numbering.owned < self.torn.n_gluing]
+        total, count = numbering.comm.allreduce(np.array([glued.sum(), len(glued)]))
+        typical = float(total / max(count, 1.0))
+        return SoftMotions.of(self.torn, coarse.matrix, typical, factor)
+
+    @cached_property
+    def flexibility(self) -> np.ndarray:
+        """How far bodies give way to a force in each row b of B, b D⁻¹ bᵀ, owned, [length / force].
+
+        Collective on first use.
+        """
+        B, numbering = self._B_interface, self.torn.numbering
         stiffest = max((part.typical_stiffness for part in self.torn.subdomains), default=0.0)
-        typical = total / (max(count, 1.0) * comm.allreduce(stiffest, op=MPI.MAX))
-        return SoftMotions.of(self.torn.subdomains, self._B, numbering, coarse.matrix, float(typical), factor)
+        unit = numbering.comm.allreduce(stiffest, op=MPI.MAX)
+        return np.asarray(numbering.to_owned(np.asarray(B.multiply(B) @ self._compliance())) / unit)
 
     def _diagonal(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the diagonal of F on contact rows, one elsewhere, and marks of filled rows. Collective."""

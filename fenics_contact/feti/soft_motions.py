@@ -2,7 +2,7 @@
 
 The matrix K of such a subdomain is regular, and the equilibrium G λ = e lacks its rigid motions R, whose
 stiffness S = RᵀK R may be small: without a coarse space for them FETI is not scalable. With K⁺ of the
-subdomain floating, F = F̃ + Gᵀ S⁻¹ G, and springs with forces σ hold it in
+subdomain floating, F = F̃ + Gᵀ S⁻¹ G, and bonds with forces σ hold it in
 
     min ½ λᵀF̃ λ + ½ σᵀS⁻¹σ − dᵀλ   subject to   G λ + σ = e,
 
@@ -21,22 +21,21 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI
-from fenics_contact.feti.decomposition import DualNumbering
 from fenics_contact.feti.kernel_basis import TornModes
-from fenics_contact.feti.subdomain import Subdomain
-from fenics_contact.qp.coarse import CoarseSpace, gram_matrix, plus
-from fenics_contact.qp.problem import Dependence, FacePreconditioner, Operator, RowsOfFace
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.coarse import CoarseSpace, summed_if_small
+from fenics_contact.qp.problem import Dependence, FacePreconditioner, RowsOfFace
 
-#: ω: by how much the springs of soft motions are more flexible than rows are. Forces that cost little energy
-#: in the bodies should not pass into stiff springs; measured between 3 and 10, it hardly matters.
+#: ω: by how much the bonds of soft motions are more flexible than rows are. Forces that cost little energy
+#: in the bodies should not pass into stiff bonds; measured between 3 and 10, it hardly matters.
 MORE_FLEXIBLE = 10.0
 #: Motions this many times stiffer than rows hold the subdomain: they need no coarse space.
 FIRM = 5.0
@@ -59,15 +58,13 @@ class SoftMotions:
     @classmethod
     def of(
         cls,
-        subdomains: Sequence[Subdomain],
-        B: sp.csr_matrix,
-        numbering: DualNumbering,
+        torn: TornSystem,
         floating: sp.csr_matrix,
         flexibility: float,
         factor: np.ndarray | float,
     ) -> SoftMotions:
-        """Return those of this rank's subdomains and its columns of the equilibrium. Collective."""
-        comm = numbering.comm
+        """Return those of a torn system, with this rank's columns of its equilibrium. Collective."""
+        subdomains, numbering, comm = torn.subdomains, torn.numbering, torn.numbering.comm
         soft = [flexibility * each.resistance < FIRM for each in subdomains]
         mine = {each.mesh.number: each.resistance[some] for each, some in zip(subdomains, soft, strict=True)}
         every = {number: own for part in comm.allgather(mine) for number, own in part.items()}
@@ -82,7 +79,7 @@ class SoftMotions:
             tuple(each.resisted[:, some] for each, some in zip(subdomains, soft, strict=True)),
             sp.csr_matrix(entries, shape=(len(column), int(first[-1]))),
         )
-        columns = sp.vstack([floating, numbering.sum_rows(sp.csr_matrix(moved.moved_by(B))).T])
+        columns = sp.vstack([floating, numbering.sum_rows(sp.csr_matrix(moved.moved_by(torn.B))).T])
         columns = (columns @ sp.diags(factor * np.ones(columns.shape[1]))).tocsr()
         stiffness = np.concatenate([np.zeros(floating.shape[0]), *(every[number] for number in numbers)])
         return cls(comm, columns, stiffness, flexibility, factor)
@@ -95,9 +92,8 @@ class SoftMotions:
     def coarse(self, restriction: sp.csr_matrix) -> CoarseSpace:
         """Return G Z with the inverse of G Z ZᵀGᵀ + T². Collective."""
         columns = (self.columns @ restriction).tocsr()
-        gram, added = gram_matrix(self.comm, columns), self._added
-        if isinstance(gram, np.ndarray) or self.comm.rank == 0:  # beyond the limit each rank has its share
-            gram = plus(gram, added)
+        share = (columns @ columns.T + (self.comm.rank == 0) * self._added).tocsr()  # each rank has its own
+        gram = summed_if_small(self.comm, share)
         return CoarseSpace(self.comm, columns, np.zeros(len(self.stiffness)), gram=gram)
 
     @cached_property
@@ -105,16 +101,23 @@ class SoftMotions:
         """T², shape (m, m)."""
         return sp.diags(MORE_FLEXIBLE * self.flexibility * self.stiffness).tocsr()
 
-    def preconditioner(self, inner: FacePreconditioner) -> FacePreconditioner:
+    def preconditioner(self, inner: InnerPreconditioner) -> FacePreconditioner:
         """Return a preconditioner of floating subdomains as one of these, itself without soft motions."""
         return TwoLevel(inner, self) if self.count else inner
+
+
+class InnerPreconditioner(FacePreconditioner, Protocol):
+    """A preconditioner whose faces know which of their rows depend on each other."""
+
+    def on_face(self, restriction: sp.csr_matrix) -> RowsOfFace:
+        """Return the preconditioner of the face with basis Z, shape (n_owned, n_face). Collective."""
 
 
 @dataclass(frozen=True, eq=False)
 class TwoLevel:
     """The preconditioner of all rows."""
 
-    inner: FacePreconditioner
+    inner: InnerPreconditioner
     motions: SoftMotions
 
     def __call__(self, residual: np.ndarray) -> np.ndarray:
@@ -123,8 +126,7 @@ class TwoLevel:
 
     @cached_property
     def _everywhere(self) -> TwoLevelOfFace:
-        every = sp.identity(self.motions.columns.shape[1], format="csr")
-        return TwoLevelOfFace(self.inner, self.motions, every, self.motions.coarse(every))
+        return self.on_face(sp.identity(self.motions.columns.shape[1], format="csr"))
 
     def on_face(self, restriction: sp.csr_matrix) -> TwoLevelOfFace:
         """Return the preconditioner of the face with basis Z, shape (n_owned, n_face). Collective."""
@@ -136,7 +138,7 @@ class TwoLevel:
 class TwoLevelOfFace:
     """The preconditioner of a face."""
 
-    inner: Operator
+    inner: RowsOfFace
     motions: SoftMotions
     restriction: sp.csr_matrix
     coarse: CoarseSpace
@@ -151,4 +153,4 @@ class TwoLevelOfFace:
 
     def contradiction(self, residual: np.ndarray) -> Dependence | None:
         """Return what no force on the face's rows changes, see `qp.RowsOfFace`. Collective."""
-        return self.inner.contradiction(residual) if isinstance(self.inner, RowsOfFace) else None
+        return self.inner.contradiction(residual)

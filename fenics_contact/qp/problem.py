@@ -96,8 +96,8 @@ class Unscaled:
 
 
 @dataclass(frozen=True, eq=False)
-class SprungRows:
-    """Rows of equality that give way in proportion to their forces, as those of springs do.
+class CompliantRows:
+    """Rows of equality that give way in proportion to their forces.
 
     `rows`: their positions, owned; `compliance`: C of each, which the operator has on its diagonal.
     """
@@ -105,12 +105,12 @@ class SprungRows:
     rows: npt.NDArray[np.int64]
     compliance: Vector
 
-    def scaled(self, factor: Vector) -> SprungRows:
+    def scaled(self, factor: Vector) -> CompliantRows:
         """Return those of multipliers λ / s, with the factors s of all rows, owned."""
         return replace(self, compliance=factor[self.rows] ** 2 * self.compliance)
 
 
-NO_SPRINGS = SprungRows(np.zeros(0, dtype=np.int64), np.zeros(0))
+NO_COMPLIANT_ROWS = CompliantRows(np.zeros(0, dtype=np.int64), np.zeros(0))
 
 
 def unknown_reach(multiplier: Vector, alpha: Vector) -> Vector:
@@ -140,7 +140,7 @@ class DualProblem:
             moves them, and their diagonal is not a flexibility. Or one mark for all.
         friction: The law of the slip bounds; None where no disc carries a force.
         compliance: By how much contact rows give way to their forces.
-        springs: Rows of equality that give way.
+        compliant: Rows of equality that give way.
         least: Sizes below which those of forces and jumps do not fall in residuals.
         given: c of all rows, the gaps before anything moves, owned, shape (size,), [length]; None where it
             does not matter where bodies without forces are.
@@ -160,7 +160,7 @@ class DualProblem:
     supported: Marks | bool = False
     friction: SlipLaw | None = None
     compliance: ContactLaw = EXACT
-    springs: SprungRows = NO_SPRINGS
+    compliant: CompliantRows = NO_COMPLIANT_ROWS
     least: LeastSizes = LeastSizes()
     exact: Operator | None = None
     given: Vector | None = None
@@ -281,7 +281,7 @@ class Scaling:
             reach=lambda x, alpha: s * reach(s * x, alpha),
             friction=problem.law.scaled(s[problem.layout.tangential[:, 0]]),
             compliance=problem.compliance.scaled(s),
-            springs=problem.springs.scaled(s),
+            compliant=problem.compliant.scaled(s),
         )
 
 

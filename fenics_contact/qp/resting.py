@@ -13,7 +13,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact.qp.problem import NO_SPRINGS, DualProblem
+from fenics_contact.qp.problem import NO_COMPLIANT_ROWS, DualProblem
 from fenics_contact.qp.reductions import Vector, global_max
 from fenics_contact.qp.rigid_motions import RigidMotionCorrection
 
@@ -44,7 +44,8 @@ class LooseMotions:
         none = cls(np.zeros((problem.coarse.m, 0)), np.zeros((0, 0)), nothing, nothing, marks, 0.0)
         if problem.given is None:
             return none
-        correction = RigidMotionCorrection.build(replace(problem, springs=NO_SPRINGS))  # springs hold, too
+        held_alike = replace(problem, compliant=NO_COMPLIANT_ROWS)  # rows that give way hold, too
+        correction = RigidMotionCorrection.build(held_alike)
         if correction.motions.shape[1] == 0:
             return none
         layout, comm = problem.layout, problem.comm

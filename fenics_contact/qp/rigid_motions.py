@@ -25,16 +25,17 @@ class RigidMotionCorrection:
 
         Nᵀ G P_Λ(λ − ρ (r − Gᵀ N β)) = Nᵀ e,
 
-    six equations per body; springs respond with λ − (r − Gᵀ N β) / C. The next face of Newton's method then
-    holds the bodies: otherwise a weakly held body overshoots its position in every step, and others are not
-    held at all.
+    six equations per body; rows of equality that give way respond with λ − (r − Gᵀ N β) / C. The next face of
+    Newton's method then holds the bodies: otherwise a weakly held body overshoots its position in every step,
+    and others are not held at all.
 
     Newton's method with the bound that follows the trial normal force comes first. Where it does not halve
     the imbalance in every step, the bound is frozen and updated alternately; then β minimises a convex
     potential, for friction the sum of Huber functions of the slips, with global convergence. Where no motion
     balances the load under these bounds, bodies move as on linear springs. `motions`: N, orthonormal motions
-    of bodies that no equality row holds but those of springs, replicated; `rows`: Gᵀ N without rounding;
-    `unresisted`: motions that contact resists less than this, relative to the others, are left unchanged.
+    of bodies that no row of equality holds but those that give way, replicated; `rows`: Gᵀ N without
+    rounding; `unresisted`: motions that contact resists less than this, relative to the others, are left
+    unchanged.
     """
 
     problem: DualProblem
@@ -57,7 +58,7 @@ class RigidMotionCorrection:
         if self.motions.shape[1] == 0:
             return np.zeros(len(self.motions))
         problem, step = self.problem, np.array(step)
-        step[problem.springs.rows] = 1.0 / problem.springs.compliance
+        step[problem.compliant.rows] = 1.0 / problem.compliant.compliance
         stiffness = problem.comm.allreduce(self.rows.T @ (step[:, None] * self.rows))
         values, vectors = np.linalg.eigh(stiffness)
         resisted = values > self.unresisted * values.max(initial=0.0)
@@ -82,14 +83,14 @@ def keep_free_motions(face: CoarseSpace, earlier: Vector, alpha: Vector) -> Vect
 
 def _floating_motions(problem: DualProblem) -> Vector:
     """Return N, orthonormal; no columns where there is no contact. Collective."""
-    m, equality = problem.coarse.m, np.setdiff1d(problem.layout.equality, problem.springs.rows)
+    m, equality = problem.coarse.m, np.setdiff1d(problem.layout.equality, problem.compliant.rows)
     if global_max(problem.comm, float(problem.layout.n_contact)) == 0.0 or m == 0:
         return np.zeros((m, 0))
     columns = np.arange(len(equality))
     selection = sp.csr_matrix(
         (np.ones(len(equality)), (equality, columns)), shape=(problem.layout.size, len(equality))
     )
-    null = problem.coarse.restricted(selection, whole=len(problem.springs.rows) == 0).gram.null_space
+    null = problem.coarse.restricted(selection, whole=len(problem.compliant.rows) == 0).gram.null_space
     return np.asarray(np.linalg.qr(null)[0], dtype=np.float64)
 
 
@@ -126,9 +127,9 @@ class _Springs:
     refreshes: int = 30  # updates of frozen bounds
 
     @property
-    def sprung(self) -> npt.NDArray[np.int64]:
-        """Positions of the rows of springs."""
-        return self.problem.springs.rows
+    def compliant(self) -> npt.NDArray[np.int64]:
+        """Positions of the rows of equality that give way."""
+        return self.problem.compliant.rows
 
     def at(self, z: Vector, bound: Vector | None = None) -> _Balance:
         """Return the balance at a motion, with a frozen bound or that of the trial force. Collective."""
@@ -140,9 +141,9 @@ class _Springs:
         w, p = trial[contact], force[contact]
         # ½‖w‖² − ½‖w − p‖² without its cancellation; its derivative is p.
         energy = float((w - 0.5 * p) @ (p / self.step[contact])) - self.problem.compliance.work(force)
-        pulled = trial[self.sprung]
-        energy += 0.5 * float(pulled @ (pulled / self.step[self.sprung]))
-        resultant = self.rows[contact].T @ p + self.rows[self.sprung].T @ pulled
+        pulled = trial[self.compliant]
+        energy += 0.5 * float(pulled @ (pulled / self.step[self.compliant]))
+        resultant = self.rows[contact].T @ p + self.rows[self.compliant].T @ pulled
         sums = global_sum(self.problem.comm, resultant, energy)
         return _Balance(z, trial, bound, sums[:-1] - self.load, float(sums[-1] - self.load @ z))
 
@@ -160,7 +161,7 @@ class _Springs:
         contact = self.problem.layout.contact
         feasible = FeasibleSet(self.problem.layout, balance.bound)
         force = self.problem.compliance.resolve(feasible, balance.trial, self.step)
-        acting = np.concatenate([contact, self.sprung])
+        acting = np.concatenate([contact, self.compliant])
         sizes = global_sum(self.problem.comm, np.abs(self.rows[acting]).T @ np.abs(force[acting]))
         return float(max(np.linalg.norm(self.load), np.linalg.norm(sizes)))
 
@@ -170,7 +171,7 @@ class _Springs:
         closed = normal[balance.trial[normal] > 0.0]
         soft = self.problem.compliance.rows_at(balance.trial, self.step)
         step = soft.softened(self.problem.layout, self.step)
-        held = np.concatenate([closed, self.sprung])
+        held = np.concatenate([closed, self.compliant])
         local = self.rows[held].T @ (step[held, None] * self.rows[held])
         moved = step[pairs, None] * self.rows[pairs]
         trial = soft.slipping(self.problem.layout, balance.trial, self.step)
@@ -192,7 +193,7 @@ class _Springs:
         along = self.rows @ direction
         layout = self.problem.layout
         pressed = self.step[layout.normal] @ np.maximum(along[layout.normal], 0.0) ** 2
-        pressed += self.step[self.sprung] @ along[self.sprung] ** 2
+        pressed += self.step[self.compliant] @ along[self.compliant] ** 2
         rubbed = bound @ np.linalg.norm(along[layout.tangential], axis=1)
         pressed, rubbed = global_sum(self.problem.comm, pressed, rubbed)
         return bool(pressed <= ROUNDING and rubbed < self.load @ direction)

@@ -24,7 +24,7 @@ from fenics_contact import (
 from fenics_contact.feti.soft_motions import SoftMotions, TwoLevel
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.linear_state import LinearState, as_linear
 
 YOUNG = 2.1e5
 STEEL = IsotropicElasticity(YOUNG, 0.3)
@@ -38,9 +38,8 @@ def cube(n: int, stiffness: float) -> LinearState:
     if np.isfinite(stiffness):
         held = {"supports": [], "foundations": [ElasticFoundation("cube", "z0", (stiffness,) * 3)]}
     scene = Scene({"cube": Body(mesh, STEEL)}, loads=[Traction("cube", "z1", (20.0, 0.0, -50.0))], **held)
-    return solve_scene(
-        scene, MPI.COMM_SELF, partitions={"cube": box_partition(mesh, (n,) * 3)}, tolerance=1e-6
-    )
+    parts = {"cube": box_partition(mesh, (n,) * 3)}
+    return as_linear(solve_scene(scene, MPI.COMM_SELF, partitions=parts, tolerance=1e-6), "products")
 
 
 @pytest.mark.parametrize("share", [5.0, 0.5, 5e-3, 5e-5, 5e-7])
@@ -141,8 +140,6 @@ def test_a_stiff_body_beside_does_not_spoil_it() -> None:
 
 def test_none_are_none() -> None:
     state = cube(2, np.inf)
-    motions = SoftMotions.of(
-        state.torn.subdomains, state.torn.B, state.torn.numbering, state.dual.problem.coarse.matrix, 1.0, 1.0
-    )
+    motions = SoftMotions.of(state.torn, state.dual.problem.coarse.matrix, 1.0, 1.0)
     assert motions.count == 0
     assert motions.preconditioner(state.dual.preconditioner) is state.dual.preconditioner

@@ -23,7 +23,7 @@ from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.qp import DualProblem, FaceNewton, Smalse, solve
 from fenics_contact.qp.cones import CoulombLaw, Proportional, TrescaLaw
-from fenics_contact.qp.problem import NO_SPRINGS
+from fenics_contact.qp.problem import NO_COMPLIANT_ROWS
 from fenics_contact.qp.rigid_motions import RigidMotionCorrection, _Springs
 from fenics_contact.qp.solution import contact_step
 from tests.qp.torn_bricks import Bricks, torn_problem
@@ -158,17 +158,17 @@ def test_springs_let_a_body_come_to_rest_as_they_are():
     state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
     assert state.solution.products < 80  # 300 where springs counted as rows that hold
     problem = state.dual.problem
-    sprung = problem.springs.rows
+    sprung = problem.compliant.rows
     correction = RigidMotionCorrection.build(problem)
     assert len(sprung) == 5
     assert correction.motions.shape[1] == 6
-    assert RigidMotionCorrection.build(replace(problem, springs=NO_SPRINGS)).motions.shape[1] < 6
+    assert RigidMotionCorrection.build(replace(problem, compliant=NO_COMPLIANT_ROWS)).motions.shape[1] < 6
     rng, law = np.random.default_rng(1), state.torn.law
     multiplier = problem.coarse.particular() + 10.0 * rng.standard_normal(problem.layout.size)
     residual = problem.operator(multiplier) - problem.rhs
     step = contact_step(problem.layout, problem.diagonal)
     motion = RigidMotionCorrection.build(problem.with_law(law))(multiplier, residual, step)
-    step[sprung] = 1.0 / problem.springs.compliance
+    step[sprung] = 1.0 / problem.compliant.compliance
     trial = multiplier - step * (residual - problem.coarse.transpose(motion))
     force = law.feasible(trial).project(trial)
     missing = correction.motions.T @ (problem.coarse.matrix @ force - problem.coarse.load)
