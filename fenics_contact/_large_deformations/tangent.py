@@ -466,9 +466,13 @@ def linearised(
         body = torn.scene.bodies[subdomain.mesh.body]
         kernel = body.kinematics.rigid_modes(points).reshape(subdomain.mesh.size, -1)
         matrix = CachedMatrix(partial(_itself, tangent))
+        # All motions are in the kernel, whatever resists them.
         subdomains.append(
-            replace(subdomain, points=points, kernel=kernel, load=unbalanced[part], matrix=matrix)
-        )
+            replace(
+                subdomain, points=points, kernel=kernel, resisted=kernel[:, :0], resistance=np.zeros(0),
+                load=unbalanced[part], matrix=matrix,
+            )
+        )  # fmt: skip
         start = part.stop
     return replace(torn, subdomains=tuple(subdomains), right=constraint_residual)
 

@@ -90,7 +90,8 @@ def _floating_motions(problem: DualProblem) -> Vector:
     selection = sp.csr_matrix(
         (np.ones(len(equality)), (equality, columns)), shape=(problem.layout.size, len(equality))
     )
-    null = problem.coarse.restricted(selection, whole=len(problem.compliant.rows) == 0).gram.null_space
+    whole = global_max(problem.comm, float(len(problem.compliant.rows))) == 0.0
+    null = problem.coarse.restricted(selection, whole=whole).gram.null_space
     return np.asarray(np.linalg.qr(null)[0], dtype=np.float64)
 
 
