@@ -26,7 +26,14 @@ from fenics_contact.feti.soft_motions import SoftMotions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import NO_ELIMINATION, CoarseSpace
-from fenics_contact.qp.problem import CompliantRows, DualProblem, Operator, Scaling, Unscaled
+from fenics_contact.qp.problem import (
+    CompliantRows,
+    DualProblem,
+    FacePreconditioner,
+    Operator,
+    Scaling,
+    Unscaled,
+)
 
 
 class DirichletPreconditioner:
@@ -271,7 +278,7 @@ class DualSystem:
             coarse,
             self.torn.layout,
             diagonal,
-            self._soft_motions(coarse, scaling.factor).preconditioner(preconditioner),
+            self._with_soft_motions(preconditioner, coarse, scaling.factor),
             scaling,
             self.reach,
             supported,
@@ -501,13 +508,18 @@ class DualSystem:
         high = numbering.comm.allreduce(factor.max(initial=0.0), op=MPI.MAX)
         return Unscaled() if high - low <= 1e-6 * high else Scaling.build(factor / high, coarse)
 
-    def _soft_motions(self, coarse: CoarseSpace, factor: np.ndarray | float) -> SoftMotions:
-        """Return the motions that foundations resist, with those that float, in scaled rows. Collective."""
+    def _with_soft_motions(
+        self, inner: DirichletPreconditioner, coarse: CoarseSpace, factor: np.ndarray | float
+    ) -> FacePreconditioner:
+        """Return the preconditioner with the motions that foundations resist, in scaled rows. Collective."""
         numbering = self.torn.numbering
+        resisted = sum(len(part.resistance) for part in self.torn.subdomains)
+        if not numbering.comm.allreduce(resisted):
+            return inner  # without foundations neither squares of B nor a copy of G are needed
         glued = (factor**2 * self.flexibility)[numbering.owned < self.torn.n_gluing]
         total, count = numbering.comm.allreduce(np.array([glued.sum(), len(glued)]))
         typical = float(total / max(count, 1.0))
-        return SoftMotions.of(self.torn, coarse.matrix, typical, factor)
+        return SoftMotions.of(self.torn, coarse.matrix, typical, factor).preconditioner(inner)
 
     @cached_property
     def flexibility(self) -> np.ndarray:
