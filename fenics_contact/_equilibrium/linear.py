@@ -221,13 +221,14 @@ def _torn(scene: Scene, decomposition: Decomposition, previous: Previous, wanted
 def _again(
     scene: Scene, decomposition: Decomposition, known: State | None, *, overlap: bool = True
 ) -> TornSystem:
-    return build_torn_system(scene, decomposition, overlap=overlap, previous=known.torn if known else None)
+    torn = None if known is None else known.torn
+    return build_torn_system(scene, decomposition, overlap=overlap, previous=torn)
 
 
 def _checked(torn: TornSystem, known: State | None) -> TornSystem:
     """Return a system whose bodies are held against their loads, unless that is known. Collective."""
-    same = known and torn.points is known.torn.points
-    if not (known and same and _loads_of(torn) == _loads_of(known.torn)):
+    same = known is not None and torn.points is known.torn.points
+    if known is None or not same or _loads_of(torn) != _loads_of(known.torn):
         check_held(torn)
     return torn
 
