@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
@@ -139,38 +138,73 @@ class Statuses:
     """Statuses of contact at a multiplier, and the rows that are free for them.
 
     `slip`: discs on the circle, owned; the others are pinned (Ψ = 0); `directions`: multiplier whose friction
-    forces give the directions, owned.
+    forces give the directions, owned; `multiplier`: the one as found, owned; `softness`: how much more rows
+    give way than the bodies there, owned.
     """
 
-    problem: DualProblem
+    system: DualSystem
     closed: Marks
     stick: Marks
     slip: Marks
     directions: Vector
+    multiplier: Vector
+    softness: Vector
+
+    @property
+    def problem(self) -> DualProblem:
+        """The dual problem."""
+        return self.system.problem
+
+    @cached_property
+    def soft(self) -> Marks:
+        """Marks of rows that give way more than the bodies there, owned."""
+        return self.softness > 1.0
+
+    @cached_property
+    def gives_way(self) -> bool:
+        """Whether some row is soft or foundations hold some body. Collective on first use."""
+        soft = global_max(self.problem.comm, float(self.soft.any()))
+        return self.system.soft_motions.count > 0 or soft > 0.0
 
     @cached_property
     def free(self) -> sp.csr_matrix:
         """Basis of the rows whose multipliers are free and in which r should vanish, shape (size, n_face)."""
-        return basis(self.problem.layout, self.closed, self.stick, self.slip, self.directions)
+        return self._weighted(basis(self.problem.layout, self.closed, self.stick, self.slip, self.directions))
 
     @cached_property
     def coarse(self) -> CoarseSpace:
         """Equilibrium on the free rows only, in scaled multipliers. Collective on first use."""
-        return self.problem.scaled_problem.coarse.restricted(self.free)
+        return self.system.soft_motions.coarse(self.free)
+
+    def _weighted(self, rows: sp.csr_matrix) -> sp.csr_matrix:
+        """Return rows with weights: forces on soft ones cost more, and their lengths less."""
+        return (sp.diags(np.maximum(self.softness, 1.0) ** -0.5) @ rows).tocsr()
 
     def spaces(self) -> Iterator[tuple[sp.csr_matrix, CoarseSpace]]:
         """Bases of rows with their equilibrium: of the free rows, of all closed contacts, of all."""
         yield self.free, self.coarse
-        layout, coarse = self.problem.layout, self.problem.scaled_problem.coarse
+        layout, coarse = self.problem.layout, self.system.soft_motions.coarse
         nowhere = np.zeros_like(self.slip)
         pressing = basis(layout, self.closed, self.stick | self.slip, nowhere, self.directions)
-        yield pressing, coarse.restricted(pressing)
-        yield sp.identity(layout.size, format="csr"), coarse
+        for rows in (pressing, sp.identity(layout.size, format="csr")):
+            weighted = self._weighted(rows)
+            yield weighted, coarse(weighted)
 
-    def settled(self, residual: Vector) -> Vector:
-        """Return r without the rigid motions that fit it best on the free rows. Collective."""
-        scaled = self.free.T @ (scaling_factors(self.problem) * residual)
-        return residual - self.problem.coarse.transpose(self.coarse.coefficients(scaled))
+    def lacking(self, point: Vector, rows: sp.csr_matrix, coarse: CoarseSpace) -> Vector:
+        """Return what a multiplier has too much in some rows for equilibrium, owned. Collective."""
+        resultants = self.system.soft_motions.resultants(
+            self.problem.coarse.residual(point), point - self.multiplier
+        )
+        return np.asarray(scaling_factors(self.problem) * (rows @ coarse.transpose(coarse.solve(resultants))))
+
+    def settled(self, residual: Vector) -> tuple[Vector, Vector]:
+        """Return r after the motions that fit it best on the free rows, and soft ones of the interface.
+
+        Where all rows counted alike, bodies that soft rows or foundations hold would be bent instead of
+        moved. Collective.
+        """
+        after, moved = self.system.soft_motions.fitted(self.coarse, self.free, residual)
+        return after, moved[self.system.inverse.interface]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +224,7 @@ class Admissible:
 
 
 def admissible(
-    problem: DualProblem, slip_bound: Vector, follows: Marks, multiplier: Vector, residual: Vector
+    system: DualSystem, slip_bound: Vector, follows: Marks, multiplier: Vector, residual: Vector
 ) -> Admissible:
     """Compute an admissible multiplier near a given one. Collective; no product.
 
@@ -199,7 +233,8 @@ def admissible(
     slip are not small. Elsewhere λ is projected on the cone. `follows`: discs whose slip bound follows the
     normal force, owned. That of the others is given and not raised.
     """
-    layout, step = problem.layout, contact_step(problem.layout, problem.diagonal)
+    problem, layout = system.problem, system.problem.layout
+    step = contact_step(layout, problem.diagonal)
     trial = multiplier - step * residual
     wanted = trial[layout.tangential]
     length = np.linalg.norm(wanted, axis=1)
@@ -209,7 +244,8 @@ def admissible(
     start[layout.normal[trial[layout.normal] <= 0.0]] = 0.0
     start[layout.tangential[slip]] = (slip_bound[slip] / length[slip])[:, None] * wanted[slip]
     stick = (slip_bound > 0.0) & ~slip
-    statuses = Statuses(problem, trial[layout.normal] > 0.0, stick, slip, start)
+    softness = relative_softness(system, multiplier)
+    statuses = Statuses(system, trial[layout.normal] > 0.0, stick, slip, start, multiplier, softness)
     feasible = FeasibleSet(layout, slip_bound)
     balanced, left = _balanced(statuses, feasible, start)
     if left > ROUNDING:
@@ -244,17 +280,35 @@ def _balanced(
     fraction of the imbalance makes no progress.
     """
     problem, point = statuses.problem, feasible.project(start)
+    if statuses.system.soft_motions.count:
+        point = _restored(statuses, feasible, point, rounds, progress)
     left = _unbalanced(problem, point)
     for rows, coarse in statuses.spaces():
         for _ in range(rounds):
             if left <= ROUNDING:
                 return point, left
-            lacking = rows @ coarse.transpose(coarse.solve(problem.coarse.residual(point)))
-            point = feasible.project(point - scaling_factors(problem) * lacking)
+            point = feasible.project(point - statuses.lacking(point, rows, coarse))
             before, left = left, _unbalanced(problem, point)
             if left > progress * before:
                 break
     return point, left
+
+
+def _restored(
+    statuses: Statuses, feasible: FeasibleSet, point: Vector, rounds: int, progress: float
+) -> Vector:
+    """Return a multiplier of the cone whose resultants on soft motions are nearly those found. Collective.
+
+    Nothing requires that, but soft motions would have to be taken back at the price of their energy.
+    """
+    problem, left = statuses.problem, np.inf
+    for _ in range(rounds):
+        lacking = statuses.lacking(point, statuses.free, statuses.coarse)
+        point = feasible.project(point - lacking)
+        before, left = left, problem.norm(lacking)
+        if left <= ROUNDING * _forces(problem, point) or left > progress * before:
+            break
+    return point
 
 
 def basis(
@@ -301,13 +355,14 @@ class Lifted:
     left: float
 
 
-def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: float) -> Lifted:
+def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: float, start: Vector) -> Lifted:
     """Close the rows that should be closed, and those that would penetrate after the correction. Collective.
 
     The correction is that of the Dirichlet preconditioner, w = D⁻¹Bᵀ(B D⁻¹Bᵀ)⁻¹ r, with its energy wᵀ S w:
     the preconditioned residual rᵀ M r. The effect of regularising the contact block is corrected at the cost
     of that small block alone; S is applied once, for half an F-product. `cancelled`: norm of the
-    displacements that cancel in r.
+    displacements that cancel in r; `start`: displacement of the interface that r contains already. Soft rows
+    are left as they are.
     """
     comm, tangential = system.problem.comm, system.problem.layout.tangential
     slid = np.linalg.norm(residual[tangential], axis=1)
@@ -315,11 +370,13 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
     # Where a slip is short, removing its part across the friction force costs less energy than keeping it.
     statuses = known.statuses
     across = statuses.slip & (step * slid < known.slip_bound)
-    rows = _Rows(system, known, statuses.closed, statuses.stick, across, soft_rows(system))
-    closing = _close(rows, residual, cancelled)
+    sprung = statuses.soft[tangential[:, 0]]
+    closed = statuses.closed & ~statuses.soft[system.problem.layout.normal]
+    rows = _Rows(system, known, closed, statuses.stick & ~sprung, across & ~sprung)
+    closing = _close(rows, residual, cancelled, start)
     if closing.left > UNLIFTED:  # a node of two pairs may be set to stick where it should close
         nothing = np.zeros_like(across)
-        closing = _close(replace(rows, stick=nothing, across=nothing), residual, cancelled)
+        closing = _close(replace(rows, stick=nothing, across=nothing), residual, cancelled, start)
     energy, force = system.inverse.energy(closing.displacement)
     energy = float(global_sum(comm, energy)[0])
     after = closing.residual - closing.rows.spread(closing.rows.wanted(closing.residual))
@@ -337,16 +394,16 @@ class _Closing:
     left: float
 
 
-def _close(rows: _Rows, residual: Vector, cancelled: float, refinements: int = 12) -> _Closing:
+def _close(rows: _Rows, residual: Vector, cancelled: float, w: Vector, refinements: int = 12) -> _Closing:
     """Close rows, and those that penetrate afterwards. Collective; no application of S."""
-    system = rows.system
-    comm, w = system.problem.comm, np.zeros(len(system.inverse.interface))
+    system, comm = rows.system, rows.system.problem.comm
     start = global_max(comm, np.abs(rows.wanted(residual)).max(initial=0.0))
     small = max(UNLIFTED * start, LAST_PLACES * cancelled)
+    moved = w
     lifting, current, violation = system.preconditioner.lifting(rows.restriction), residual, start
     for _ in range(refinements):
-        w += lifting.jump(rows.spread(rows.wanted(current)))
-        current = residual - system.interface_jump(w)
+        w = w + lifting.jump(rows.spread(rows.wanted(current)))
+        current = residual - system.interface_jump(w - moved)
         more = rows.penetrating(current, small)
         violation = global_max(comm, np.abs(rows.wanted(current)).max(initial=0.0))
         if global_sum(comm, np.count_nonzero(more))[0] > 0.0:
@@ -361,8 +418,7 @@ def _close(rows: _Rows, residual: Vector, cancelled: float, refinements: int = 1
 class _Rows:
     """The rows that a correction closes: all equality rows and some of contacts.
 
-    `across`: discs whose slip across the friction force is removed, owned; `stretched`: soft rows that are
-    left as they are, positions among the owned ones.
+    `across`: discs whose slip across the friction force is removed, owned. Soft rows are left as they are.
     """
 
     system: DualSystem
@@ -370,7 +426,11 @@ class _Rows:
     closed: Marks
     stick: Marks
     across: Marks
-    stretched: npt.NDArray[np.int64]
+
+    @property
+    def soft(self) -> Marks:
+        """Marks of the rows that are left."""
+        return self.known.statuses.soft
 
     @cached_property
     def restriction(self) -> sp.csr_matrix:
@@ -378,8 +438,8 @@ class _Rows:
         layout = self.system.problem.layout
         rows = basis(layout, self.closed, self.stick, self.across, self.known.multiplier)
         # The first columns are those of the rows of equality, in their order.
-        left = np.searchsorted(layout.equality, self.stretched)
-        return rows[:, np.setdiff1d(np.arange(rows.shape[1]), left)]
+        left = np.flatnonzero(self.soft[layout.equality])
+        return rows[:, np.setdiff1d(np.arange(rows.shape[1]), left)] if len(left) else rows
 
     def wanted(self, residual: Vector) -> Vector:
         """Return Zᵀ r, shape (n_face,)."""
@@ -391,7 +451,8 @@ class _Rows:
 
     def penetrating(self, residual: Vector, tolerance: float) -> Marks:
         """Mark contacts that are not closed and penetrate by more than a tolerance."""
-        return np.asarray(~self.closed & (residual[self.system.problem.layout.normal] < -tolerance))
+        normal = self.system.problem.layout.normal
+        return np.asarray(~self.closed & ~self.soft[normal] & (residual[normal] < -tolerance))
 
 
 @displayed
@@ -428,10 +489,11 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     The correction w is that of the preconditioner, whose quality determines the sharpness: mostly a factor of
     two, for nearly incompressible bodies, thin plates and stiff bodies on soft ones ten to thirty.
 
-    Surfaces that give way by C(λ) count as touching where the gap is −C(λ): the terms of the second sum are
-    then φ(δ) + Φ(λ_N) − λ_N δ with Φ' = C, its conjugate φ and the closure δ of v, at most λ_N (c − B v +
-    C(λ))_N. Rows of equality that give way more than bodies keep their lengths in v, at the energy ½ (B v −
-    c − C λ)² / C.
+    Where surfaces give way by C(λ), the terms of the sum are φ(δ) + Φ(λ) − λδ with Φ' = C, its conjugate φ
+    and the closure or elastic slip δ of v, see `qp.face.ContactLaw.surplus`. Rows that give way more than
+    bodies are not closed: they keep their lengths in v, rows of equality at the energy ½ (B v − c − C λ)² /
+    C. Bodies that such rows or foundations hold are moved before they are bent, v = u + R β + w, and forces
+    on them are changed less than others.
 
     The bound is for Tresca's problem with the slip bounds of the solution. Where these are given, that is the
     actual problem; and it is infinite where no multiplier within them balances the load. Where they follow
@@ -449,7 +511,13 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     """
     problem, residual, moved = system.problem, solution.residual, 0.0
     follows = system.torn.law.growth(solution.multiplier) > 0.0
-    known = admissible(problem, solution.slip_bound, follows, solution.multiplier, residual)
+    known = admissible(system, solution.slip_bound, follows, solution.multiplier, residual)
+    gives_way = known.statuses.gives_way
+    if gives_way:  # how bodies have slid is known after they have moved
+        given_way = problem.compliance.given_way(known.multiplier)
+        trial, _ = known.statuses.settled(residual + given_way)
+        known = admissible(system, solution.slip_bound, follows, solution.multiplier, trial - given_way)
+    statuses, start = known.statuses, np.zeros(len(system.inverse.interface))
     change = known.multiplier - solution.multiplier
     moves = problem.norm(change) > LAST_PLACES * problem.norm(solution.multiplier)
     if moves:
@@ -457,12 +525,12 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
         moved = float(np.sqrt(max(problem.dot(change, product), 0.0)))
         residual = residual + product
     residual = residual + problem.compliance.given_way(known.multiplier)
-    if moves:
-        residual = known.statuses.settled(residual)
-    residual = _hung(system, known, residual)
-    lifted = lift(system, known, residual, _cancelled(problem, solution))
-    rest = _pressed(problem, known, lifted.residual) + _rubbed(problem, known, lifted.residual)
-    rest += _stretched(system, lifted.residual)
+    if moves or gives_way:
+        residual, start = statuses.settled(residual)
+    lifted = lift(system, known, residual, _cancelled(problem, solution), start)
+    feasible = FeasibleSet(problem.layout, known.slip_bound)
+    rest = problem.compliance.surplus(feasible, known.multiplier, lifted.residual)
+    rest = float(global_sum(problem.comm, rest + _stretched(problem, statuses.soft, lifted.residual))[0])
     gap = 0.5 * lifted.energy + rest
     radius = 0.5 * float(np.sqrt(lifted.energy + 4.0 * rest))
     bound = max(_distances(system, solution, lifted)) + radius + moved
@@ -489,49 +557,20 @@ def _cancelled(problem: DualProblem, solution: DualSolution) -> float:
     return global_max(problem.comm, max(moved, np.abs(problem.rhs).max(initial=0.0)))
 
 
-def soft_rows(system: DualSystem) -> npt.NDArray[np.int64]:
-    """Return the rows that give way more than the bodies there: closing them would deform bodies."""
-    given = system.problem.compliant
-    return given.rows[given.compliance > system.flexibility[given.rows]]
+def relative_softness(system: DualSystem, multiplier: Vector) -> Vector:
+    """Return how much more each row gives way than the bodies there, owned. Collective.
 
-
-def _hung(system: DualSystem, known: Admissible, residual: Vector) -> Vector:
-    """Return r after the rigid motions that close rows best, soft ones by what they resist. Collective.
-
-    Where all rows counted alike, bodies that soft rows hold would be bent instead of moved.
+    Where it is more than one, closing rows would deform bodies rather than springs.
     """
     problem, given = system.problem, system.problem.compliant
-    if global_max(problem.comm, float(len(soft_rows(system)))) == 0.0:
-        return residual
-    weight = scaling_factors(problem) ** 2
-    weight[given.rows] *= np.minimum(system.flexibility[given.rows] / given.compliance, 1.0)
-    rows = (sp.diags(np.sqrt(weight)) @ known.statuses.free).tocsr()
-    coarse = problem.coarse.restricted(rows)
-    return residual - problem.coarse.transpose(coarse.fitted(rows.T @ residual))
+    own = problem.compliance.softness(multiplier)
+    own[given.rows] = given.compliance
+    most = global_max(problem.comm, system.flexibility.max(initial=0.0))  # rows of tools move no body
+    return np.asarray(own / np.where(system.flexibility > 0.0, system.flexibility, most))
 
 
-def _stretched(system: DualSystem, residual: Vector) -> float:
-    """Return Σ ½ r² / C, the energy between length and force of soft rows. Collective."""
-    given, soft = system.problem.compliant, soft_rows(system)
-    compliance = given.compliance[np.searchsorted(given.rows, soft)]
-    return float(global_sum(system.problem.comm, 0.5 * (residual[soft] @ (residual[soft] / compliance)))[0])
-
-
-def _pressed(problem: DualProblem, known: Admissible, residual: Vector) -> float:
-    """Return Σ λ_N gap, the work of normal forces that act across a gap. Collective."""
-    normal = problem.layout.normal
-    return float(global_sum(problem.comm, known.multiplier[normal] @ np.maximum(residual[normal], 0.0))[0])
-
-
-def _rubbed(problem: DualProblem, known: Admissible, residual: Vector) -> float:
-    """Return Σ Ψ‖s‖ − τ·s, the deficit of the dissipation by friction forces. Collective.
-
-    As (Ψ − ‖τ‖)‖s‖ + ½‖τ‖‖s‖‖ŝ − τ̂‖², which is free of cancellation where force and slip are parallel.
-    """
-    tau, slid = known.multiplier[problem.layout.tangential], -residual[problem.layout.tangential]
-    force, way = np.linalg.norm(tau, axis=1), np.linalg.norm(slid, axis=1)
-    short = known.slip_bound - force
-    short[short <= ROUNDING * known.slip_bound] = 0.0
-    turned = slid / np.where(way > 0.0, way, 1.0)[:, None] - tau / np.where(force > 0.0, force, 1.0)[:, None]
-    lost = way * (short + 0.5 * force * np.einsum("ia,ia->i", turned, turned))
-    return float(global_sum(problem.comm, lost.sum())[0])
+def _stretched(problem: DualProblem, soft: Marks, residual: Vector) -> float:
+    """Return Σ ½ r² / C of this rank's soft rows of equality, the energy between length and force."""
+    given = problem.compliant
+    mine = soft[given.rows]
+    return float(0.5 * (residual[given.rows[mine]] @ (residual[given.rows[mine]] / given.compliance[mine])))

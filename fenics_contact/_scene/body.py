@@ -150,6 +150,10 @@ class Body:
         """Return a stiffness matrix of its nodes at points with that of its springs."""
         return matrix
 
+    def sprung_modes(self, points: np.ndarray) -> np.ndarray:
+        """Return its motions that its springs alone resist, (n, dim, n_modes): it has none."""
+        return np.zeros((len(points), self.components, 0))
+
     def kernel(self, points: np.ndarray, elastic: Modes) -> np.ndarray:
         """Return its motions without energy at points, (n, dim, n_modes): those of its materials."""
         return elastic(points)

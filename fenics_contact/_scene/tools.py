@@ -61,12 +61,24 @@ class ToolBody(Body):
 
     def kernel(self, points: np.ndarray, elastic: Modes) -> np.ndarray:
         """Return the motions that no spring resists, (n, dim, n_modes), turns by size of cell."""
-        free = np.array(self.springs) == 0.0 if self.springs else np.ones(3 * self.tool.dim - 3, dtype=bool)
+        return self._motions(points, ~self._sprung)
+
+    def sprung_modes(self, points: np.ndarray) -> np.ndarray:
+        """Return the motions that springs resist, (n, dim, n_modes), turns by size of cell."""
+        return self._motions(points, self._sprung)
+
+    @property
+    def _sprung(self) -> np.ndarray:
+        """Marks of the motions that springs resist."""
+        return np.array(self.springs or np.zeros(3 * self.tool.dim - 3)) > 0.0
+
+    def _motions(self, points: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Return some of the motions about its point, turns by size of cell."""
         if self.axisymmetric:  # other motions strain a body of revolution
-            free &= [False, True, False]
+            chosen = chosen & [False, True, False]
         modes, dim = self.modes(points), self.tool.dim
         modes[:, :, dim:] /= np.abs(self.mesh.points - np.array(self.tool.at)).max()
-        return modes[:, :, free]
+        return modes[:, :, chosen]
 
     def spring_matrix(self, points: np.ndarray) -> np.ndarray:
         """Return the stiffness of the springs on nodes that move with the tool, (n · dim, n · dim)."""

@@ -22,14 +22,13 @@ from fenics_contact.feti.decomposition import DualNumbering
 from fenics_contact.feti.inverse import LocalKind, TornInverse
 from fenics_contact.feti.kernel_basis import TornModes, whole_motions
 from fenics_contact.feti.reduced_coarse import Elimination
-from fenics_contact.feti.soft_motions import SoftMotions
+from fenics_contact.feti.soft_motions import NoSoftMotions, SoftMotions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import NO_ELIMINATION, CoarseSpace
 from fenics_contact.qp.problem import (
     CompliantRows,
     DualProblem,
-    FacePreconditioner,
     Operator,
     Scaling,
     Unscaled,
@@ -163,6 +162,7 @@ class DualSystem:
     unheld: sp.csr_matrix
     points: sp.csr_matrix
     preconditioner: DirichletPreconditioner
+    soft_motions: SoftMotions | NoSoftMotions
     _unheld_points: np.ndarray
     _bent: np.ndarray
     _B_interface: sp.csr_matrix
@@ -230,7 +230,7 @@ class DualSystem:
     def _take_over(self, previous: DualSystem, timer: PhaseTimer) -> None:
         """Use the operators of an earlier system with the present load. Collective."""
         self._B_interface, self._Bt_interface = previous._B_interface, previous._Bt_interface
-        self.preconditioner = previous.preconditioner
+        self.preconditioner, self.soft_motions = previous.preconditioner, previous.soft_motions
         self.kernel, self.unheld = previous.kernel, previous.unheld
         self.points, self._unheld_points = previous.points, previous._unheld_points
         self._require_unloaded()
@@ -269,6 +269,7 @@ class DualSystem:
                 preconditioner.soften(torn.compliance.soft, torn.compliance.constant)
             diagonal, supported = self._diagonal()
             self.preconditioner, scaling = preconditioner, self._scaling(coarse)
+            self.soft_motions = self._soft_motions(coarse, scaling)
         nothing = np.zeros(len(torn.numbering.owned))
         operator, exact = self._operators
         self.problem = DualProblem(
@@ -278,7 +279,7 @@ class DualSystem:
             coarse,
             self.torn.layout,
             diagonal,
-            self._with_soft_motions(preconditioner, coarse, scaling.factor),
+            self.soft_motions.preconditioner(preconditioner),
             scaling,
             self.reach,
             supported,
@@ -508,18 +509,17 @@ class DualSystem:
         high = numbering.comm.allreduce(factor.max(initial=0.0), op=MPI.MAX)
         return Unscaled() if high - low <= 1e-6 * high else Scaling.build(factor / high, coarse)
 
-    def _with_soft_motions(
-        self, inner: DirichletPreconditioner, coarse: CoarseSpace, factor: np.ndarray | float
-    ) -> FacePreconditioner:
-        """Return the preconditioner with the motions that foundations resist, in scaled rows. Collective."""
-        numbering = self.torn.numbering
+    def _soft_motions(self, coarse: CoarseSpace, scaling: Scaling | Unscaled) -> SoftMotions | NoSoftMotions:
+        """Return the motions that foundations resist, in scaled rows. Collective."""
+        numbering, factor = self.torn.numbering, scaling.factor
         resisted = sum(len(part.resistance) for part in self.torn.subdomains)
         if not numbering.comm.allreduce(resisted):
-            return inner  # without foundations neither squares of B nor a copy of G are needed
+            # Neither squares of B nor a copy of G are needed.
+            return NoSoftMotions(scaling.of_coarse(coarse), factor, self.torn.B.shape[1])
         glued = (factor**2 * self.flexibility)[numbering.owned < self.torn.n_gluing]
         total, count = numbering.comm.allreduce(np.array([glued.sum(), len(glued)]))
         typical = float(total / max(count, 1.0))
-        return SoftMotions.of(self.torn, coarse.matrix, typical, factor).preconditioner(inner)
+        return SoftMotions.of(self.torn, coarse.matrix, typical, factor)
 
     @cached_property
     def flexibility(self) -> np.ndarray:

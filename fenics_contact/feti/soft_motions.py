@@ -33,6 +33,41 @@ from fenics_contact.feti.kernel_basis import TornModes
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.coarse import CoarseSpace, summed_if_small
 from fenics_contact.qp.problem import Dependence, FacePreconditioner, RowsOfFace
+from fenics_contact.qp.reductions import global_sum
+
+#: Residual after motions, owned, and the soft ones among these, shape (torn_size,).
+Moved = tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class NoSoftMotions:
+    """Without foundations there are none.
+
+    `scaled`: the coarse space of scaled multipliers λ / s; `factor`: s, owned, or one; `size`: of torn
+    vectors.
+    """
+
+    scaled: CoarseSpace
+    factor: np.ndarray | float
+    size: int
+    count: ClassVar[int] = 0
+
+    def preconditioner(self, inner: InnerPreconditioner) -> FacePreconditioner:
+        """Return it as it is."""
+        return inner
+
+    def coarse(self, restriction: sp.csr_matrix) -> CoarseSpace:
+        """Return the coarse space of some scaled rows Z. Collective."""
+        return self.scaled.restricted(restriction)
+
+    def fitted(self, coarse: CoarseSpace, rows: sp.csr_matrix, residual: np.ndarray) -> Moved:
+        """Return r after the motions of floating subdomains that close rows best, and zeros. Collective."""
+        motion = coarse.fitted(rows.T @ (self.factor * residual))
+        return residual - self.scaled.transpose(motion) / self.factor, np.zeros(self.size)
+
+    def resultants(self, lacking: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Return ``lacking`` as it is, see `SoftMotions`."""
+        return lacking
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +75,7 @@ class SoftMotions:
     """The soft motions of all subdomains, with those that float, in the scaled multipliers λ / s.
 
     `columns`: this rank's owned columns of G s, shape (m, n_owned); `stiffness`: S, zero of motions that
-    float, shape (m,); `flexibility`: f; `factor`: s, owned, or one.
+    float, shape (m,); `flexibility`: f; `factor`: s, owned, or one; `modes`: R of the soft ones.
     """
 
     #: ω: by how much bonds of soft motions are more flexible than rows. Forces that cost little energy in
@@ -54,6 +89,7 @@ class SoftMotions:
     stiffness: np.ndarray
     flexibility: float
     factor: np.ndarray | float
+    modes: TornModes
 
     @classmethod
     def of(
@@ -82,7 +118,7 @@ class SoftMotions:
         columns = sp.vstack([floating, numbering.sum_rows(sp.csr_matrix(moved.moved_by(torn.B))).T])
         columns = (columns @ sp.diags(factor * np.ones(columns.shape[1]))).tocsr()
         stiffness = np.concatenate([np.zeros(floating.shape[0]), *(every[number] for number in numbers)])
-        return cls(comm, columns, stiffness, flexibility, factor)
+        return cls(comm, columns, stiffness, flexibility, factor, moved)
 
     @property
     def count(self) -> int:
@@ -90,16 +126,26 @@ class SoftMotions:
         return int(np.count_nonzero(self.stiffness))
 
     def coarse(self, restriction: sp.csr_matrix) -> CoarseSpace:
-        """Return G Z with the inverse of G Z ZᵀGᵀ + T². Collective."""
+        """Return G Z with the inverse of G Z ZᵀGᵀ + T². Collective; `restriction`: Z, of scaled rows."""
         columns = (self.columns @ restriction).tocsr()
-        share = (columns @ columns.T + (self.comm.rank == 0) * self._added).tocsr()  # each rank has its own
+        bonds = sp.diags((self.comm.rank == 0) * self.more_flexible * self.flexibility * self.stiffness)
+        share = (columns @ columns.T + bonds).tocsr()  # each rank has its own
         gram = summed_if_small(self.comm, share)
         return CoarseSpace(self.comm, columns, np.zeros(len(self.stiffness)), gram=gram)
 
-    @cached_property
-    def _added(self) -> sp.csr_matrix:
-        """T², shape (m, m)."""
-        return sp.diags(self.more_flexible * self.flexibility * self.stiffness).tocsr()
+    def fitted(self, coarse: CoarseSpace, rows: sp.csr_matrix, residual: np.ndarray) -> Moved:
+        """Return r after the motions that close rows best, at the price of their energy. Collective.
+
+        `rows`: basis of rows with weights, in scaled multipliers, shape (n_owned, k); `coarse`: that of them.
+        """
+        motion = coarse.fitted(rows.T @ (self.factor * residual))
+        soft = motion[len(motion) - self.modes.shape[1] :]
+        return residual - self.columns.T @ motion / self.factor, self.modes @ soft
+
+    def resultants(self, lacking: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Return G λ − e with the resultants of a change of λ, owned, on soft motions. Collective."""
+        soft = self.columns[len(lacking) :] @ (change / self.factor)
+        return np.concatenate([lacking, global_sum(self.comm, soft)])
 
     def preconditioner(self, inner: InnerPreconditioner) -> FacePreconditioner:
         """Return a preconditioner of floating subdomains as one of these, itself without soft motions."""

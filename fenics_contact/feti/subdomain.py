@@ -208,7 +208,8 @@ class Subdomain:
 
     Those that differ only in their loads share one `matrix`. `load`: f_s; `kernel`: R_s: zero-energy modes as
     columns; `typical_stiffness`: mean diagonal entry of K_s without foundations; `resisted`: motions that
-    foundations alone resist, as columns, shape (dim n, r); `resistance`: RᵀK R of each of these, shape (r,).
+    foundations or springs of a tool alone resist, as columns, shape (dim n, r); `resistance`: RᵀK R of each
+    of these, shape (r,).
     """
 
     mesh: SubdomainMesh
@@ -470,8 +471,9 @@ def _with_stiffness(
     matrix = CachedMatrix(stiffness)
     K = matrix.get()
     _check_finite(K.data, mesh)
-    kernel = kernel_of_body(body, points, parts.materials).reshape(mesh.size, -1)
-    kernel, resisted, resistance = by_resistance(bed, kernel)
+    modes = [kernel_of_body(body, points, parts.materials), body.sprung_modes(points)]
+    kernel = np.concatenate(modes, axis=-1).reshape(mesh.size, -1)
+    kernel, resisted, resistance = by_resistance(body.sprung(bed, points), kernel)
     check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
     typical = float((K.diagonal() - bed.diagonal()).mean())
     nothing = np.zeros(mesh.size)

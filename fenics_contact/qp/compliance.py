@@ -16,6 +16,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact.qp.cones import FeasibleSet
 from fenics_contact.qp.face import ContactLaw, Face, FaceRows
 from fenics_contact.qp.layout import ContactLayout
@@ -75,6 +76,32 @@ class Closures:
     def by_area(self, force: Vector) -> Vector:
         """Return dC/dA at given forces, shape (n,)."""
         return -self.growth(force) * np.maximum(force, 0.0) / self.area
+
+    def force(self, closure: Vector, forces: float, far: float = 1e12) -> Vector:
+        """Return λ ≥ 0 with C(λ) = δ, zero where δ ≤ 0, shape (n,).
+
+        `forces`: a typical force; those of ``far`` times that would be too small.
+        """
+        step = far * forces / np.maximum(closure, np.finfo(float).tiny)
+        return self.resolve(step * closure, step)
+
+    def surplus(self, force: Vector, residual: Vector) -> Vector:
+        """Return φ(δ) + Φ(λ) − λδ, the energy between a force λ and a closure δ = C(λ) − r, shape (n,).
+
+        Not less than zero, which it is where they belong to each other, and at most r times the difference of
+        λ and the force of δ; λ r⁺ for exact contact, where δ ≤ 0.
+        """
+        lost, soft = force * np.maximum(residual, 0.0), np.flatnonzero(self.curve >= 0)
+        if len(soft) == 0:
+            return lost
+        mine, force, residual = self.part(soft), force[soft], residual[soft]
+        closure = mine.closure(force) - residual
+        other = mine.force(closure, force.max(initial=np.finfo(float).tiny))
+        parts = other * closure, mine.work(other), mine.work(force), force * closure
+        exact = parts[0] - parts[1] + parts[2] - parts[3]
+        rounding = LAST_PLACES * np.abs(parts).sum(axis=0)
+        lost[soft] = np.clip(exact + rounding, 0.0, np.abs((force - other) * residual))
+        return lost
 
     def _of(self, member: str, force: Vector) -> Vector:
         pressure, values = np.maximum(force, 0.0) / self.area, np.zeros(len(force))
@@ -221,6 +248,29 @@ class Compliance(ContactLaw):
         layout, tau = self.layout, multiplier[self.layout.tangential]
         normal = self.closures.work(multiplier[layout.normal]).sum()
         return float(normal + 0.5 * self.slip @ np.einsum("ia,ia->i", tau, tau))
+
+    def softness(self, multiplier: Vector) -> Vector:
+        """Return C'(λ) of contacts and D of friction discs, owned, zero in rows of equality."""
+        layout, result = self.layout, np.zeros(self.layout.size)
+        result[layout.normal] = self.closures.growth(multiplier[layout.normal])
+        result[layout.tangential] = self.slip[:, None]
+        return result
+
+    def surplus(self, feasible: FeasibleSet, multiplier: Vector, residual: Vector) -> float:
+        """Return what forces of this rank's contacts lack to those of a displacement, in energy.
+
+        As `ContactLaw.surplus`, where a part of each approach is the closure's and of each slip the spring's.
+        """
+        layout, tau = self.layout, multiplier[self.layout.tangential]
+        lost = self.closures.surplus(multiplier[layout.normal], residual[layout.normal]).sum()
+        slid, soft = self.slip[:, None] * tau - residual[layout.tangential], self.slip > 0.0
+        elastic, slip = np.zeros_like(slid), self.slip[soft, None]
+        length = np.linalg.norm(slid[soft], axis=1, keepdims=True)
+        elastic[soft] = slid[soft] * np.minimum(
+            slip * feasible.slip_bound[soft, None] / np.where(length > 0.0, length, 1.0), 1.0
+        )
+        missing = elastic[soft] / slip - tau[soft]
+        return float(lost + 0.5 * (slip * missing**2).sum() + feasible.rubbed(tau, slid - elastic))
 
     def resolve(self, feasible: FeasibleSet, trial: Vector, step: Vector) -> Vector:
         """Return the force that the law gives to w = λ − ρ r, the resolvent of C + ∂I_Λ, owned."""

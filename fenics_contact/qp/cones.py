@@ -99,6 +99,24 @@ class FeasibleSet:
             steps = np.maximum(value[falling], 0.0) / p[falling]
         return float(min(steps.min(initial=np.inf), self._disc_steps(x, direction).min(initial=np.inf)))
 
+    def pressed(self, multiplier: Vector, residual: Vector) -> float:
+        """Return Σ λ_N r⁺, the work of normal forces that act across a gap, [force · length]."""
+        normal = self.layout.normal
+        return float(multiplier[normal] @ np.maximum(residual[normal], 0.0))
+
+    def rubbed(self, tau: Vector, slid: Vector) -> float:
+        """Return Σ Ψ‖s‖ − τ·s, the deficit of the dissipation by friction forces, [force · length].
+
+        As (Ψ − ‖τ‖)‖s‖ + ½‖τ‖‖s‖‖ŝ − τ̂‖², which is free of cancellation where force and slip are parallel.
+        """
+        force, way = np.linalg.norm(tau, axis=1), np.linalg.norm(slid, axis=1)
+        short = self.slip_bound - force
+        short[short <= ROUNDING * self.slip_bound] = 0.0
+        turned = (
+            slid / np.where(way > 0.0, way, 1.0)[:, None] - tau / np.where(force > 0.0, force, 1.0)[:, None]
+        )
+        return float((way * (short + 0.5 * force * np.einsum("ia,ia->i", turned, turned))).sum())
+
     def _disc_steps(self, x: Vector, direction: Vector) -> Vector:
         p, tau = direction[self.layout.tangential], x[self.layout.tangential]
         square = np.einsum("ia,ia->i", p, p)

@@ -95,6 +95,20 @@ class ContactLaw:
         """Return zero."""
         return 0.0
 
+    def softness(self, multiplier: Vector) -> Vector:
+        """Return C'(λ), owned: zeros."""
+        return np.zeros_like(multiplier)
+
+    def surplus(self, feasible: FeasibleSet, multiplier: Vector, residual: Vector) -> float:
+        """Return what forces of this rank's contacts lack to those of a displacement, in energy.
+
+        The conjugate energies of both less their work, not negative: Σ λ_N r⁺ + Σ Ψ‖s‖ − τ·s with slips s =
+        −r and no penetration. `multiplier`: λ of the set; `residual`: r of the displacement, with C(λ).
+        """
+        lost = feasible.pressed(multiplier, residual)
+        rows = feasible.layout.tangential
+        return lost + feasible.rubbed(multiplier[rows], -residual[rows])
+
     def resolve(self, feasible: FeasibleSet, trial: Vector, step: Vector) -> Vector:
         """Return P_Λ(w) of w = λ − ρ r, owned."""
         return feasible.project(trial)

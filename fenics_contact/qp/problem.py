@@ -86,6 +86,10 @@ class Unscaled:
         """Return itself: nothing depends on e."""
         return self
 
+    def of_coarse(self, coarse: CoarseSpace) -> CoarseSpace:
+        """Return a coarse space as it is."""
+        return coarse
+
     def of_face(self, face: Face) -> Face:
         """Return a face as it is."""
         return face
@@ -256,6 +260,10 @@ class Scaling:
     def with_load(self, load: Vector) -> Scaling:
         """Return the scaling of a problem with another right side e; factors are shared."""
         return replace(self, coarse=self.coarse.with_load(load))
+
+    def of_coarse(self, coarse: CoarseSpace) -> CoarseSpace:
+        """Return the coarse space of μ for that of λ."""
+        return self.coarse
 
     def of_face(self, face: Face) -> Face:
         """Return a face of λ as one of μ."""

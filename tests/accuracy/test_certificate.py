@@ -32,6 +32,7 @@ from fenics_contact._accuracy.state_errors import friction_error, solver_errors,
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse
+from fenics_contact.qp.cones import FeasibleSet
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual
 from fenics_contact.results.linear_state import DirectState
@@ -197,7 +198,7 @@ def error_of(state: AnyState, solution: DualSolution) -> float:
 
 def without(part: str, patch: pytest.MonkeyPatch, state: AnyState, solution: DualSolution) -> Certificate:
     with patch.context() as context:
-        context.setattr(certificate, part, lambda *_: 0.0)
+        context.setattr(FeasibleSet, part, lambda *_: 0.0)
         return certify(state.dual, solution)
 
 
@@ -215,7 +216,7 @@ def test_forces_across_a_gap_do_work(cells: tuple[int, int], monkeypatch: pytest
     error = error_of(state, hovering)
     assert error > 0.05 * energy_norm(state, state.torn_displacement)
     assert error <= found.bound
-    assert without("_pressed", monkeypatch, state, hovering).bound < 0.1 * error
+    assert without("pressed", monkeypatch, state, hovering).bound < 0.1 * error
     np.testing.assert_allclose(
         found.gap, hovering.multiplier[layout.normal] @ hovering.residual[layout.normal], rtol=1e-9
     )
@@ -245,7 +246,7 @@ def test_friction_that_falls_short_of_its_bound_does_less_work(
     assert found.moved < 0.1 * error
     assert error > 1e-3 * energy_norm(state, state.torn_displacement)
     assert error <= found.bound
-    assert without("_rubbed", monkeypatch, state, sliding).bound < 0.9 * error
+    assert without("rubbed", monkeypatch, state, sliding).bound < 0.9 * error
 
 
 @pytest.mark.parametrize(
