@@ -279,11 +279,12 @@ class DualSystem:
             coarse,
             self.torn.layout,
             diagonal,
-            self.soft_motions.preconditioner(preconditioner),
+            preconditioner,
             scaling,
             self.reach,
             supported,
             exact=exact,
+            second_level=self.soft_motions,
         )
 
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
@@ -510,16 +511,19 @@ class DualSystem:
         return Unscaled() if high - low <= 1e-6 * high else Scaling.build(factor / high, coarse)
 
     def _soft_motions(self, coarse: CoarseSpace, scaling: Scaling | Unscaled) -> SoftMotions | NoSoftMotions:
-        """Return the motions that foundations resist, in scaled rows. Collective."""
-        numbering, factor = self.torn.numbering, scaling.factor
-        resisted = sum(len(part.resistance) for part in self.torn.subdomains)
-        if not numbering.comm.allreduce(resisted):
+        """Return the motions that foundations resist, and weights of springs, in scaled rows. Collective."""
+        numbering, factor, given = self.torn.numbering, scaling.factor, self.torn.compliance
+        held = sum(len(part.resistance) for part in self.torn.subdomains)
+        if not numbering.comm.allreduce(held + len(given.soft)):
             # Neither squares of B nor a copy of G are needed.
             return NoSoftMotions(scaling.of_coarse(coarse), factor, self.torn.B.shape[1])
         glued = (factor**2 * self.flexibility)[numbering.owned < self.torn.n_gluing]
         total, count = numbering.comm.allreduce(np.array([glued.sum(), len(glued)]))
         typical = float(total / max(count, 1.0))
-        return SoftMotions.of(self.torn, coarse.matrix, typical, factor)
+        weight = np.ones(len(numbering.owned))
+        flexibility = np.maximum(self.flexibility[given.soft], np.finfo(float).tiny)
+        weight[given.soft] = np.minimum(flexibility / given.constant, 1.0)
+        return SoftMotions.of(self.torn, coarse.matrix, typical, factor, weight)
 
     @cached_property
     def flexibility(self) -> np.ndarray:

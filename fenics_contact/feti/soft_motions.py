@@ -1,4 +1,4 @@
-"""A coarse space of motions that are resisted, but little: those of subdomains on elastic foundations.
+"""A coarse space of motions that are resisted, but little: of subdomains on foundations or on springs.
 
 The matrix K of such a subdomain is regular, and the equilibrium G λ = e lacks its rigid motions R, whose
 stiffness S = RᵀK R may be small: without a coarse space for them FETI is not scalable. With K⁺ of the
@@ -7,12 +7,15 @@ subdomain floating, F = F̃ + Gᵀ S⁻¹ G, and bonds with forces σ hold it in
     min ½ λᵀF̃ λ + ½ σᵀS⁻¹σ − dᵀλ   subject to   G λ + σ = e,
 
 on which Dirichlet preconditioner and projector work as on any floating subdomains. Without σ, which G λ
-gives, their product is a preconditioner of F itself. In multipliers σ / t with t² = ω f S, where f is a
-typical flexibility of rows, and with T = diag(t),
+gives, their product is a preconditioner of F itself. On a face, in multipliers σ / t with t² = ω f S, where f
+is a typical flexibility of rows, with T = diag(t), and with W = (1 + ρκ)⁻¹ of rows that a curvature κ holds
+and f / C of springs,
 
-    a = (G Gᵀ + T²)⁻¹ G r,   y = M (r − Gᵀa),   b = (G Gᵀ + T²)⁻¹ (G y − S a),   z = y − Gᵀ b.
+    a = Γ⁻¹ G W r,   y = M (r − Gᵀa),   b = Γ⁻¹ (G y − S a),   z = y − W Gᵀ b,   Γ = G W Gᵀ + T².
 
-Motions without stiffness are among those of G, with S = 0: they keep their equilibrium, G z = 0.
+Motions without stiffness are among those of G, with S = 0: they keep their equilibrium, G z = 0. Where
+friction grows with normal forces, the G in Γ and before r and y is that of the basis along which the step
+moves, and Gᵀ that of the basis it is tested with.
 
 References:
     C. Farhat, P.-S. Chen, J. Mandel, A scalable Lagrange multiplier based domain decomposition method for
@@ -23,7 +26,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,16 +34,17 @@ import scipy.sparse as sp
 from fenics_contact._base.libraries import MPI
 from fenics_contact.feti.kernel_basis import TornModes
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.qp.coarse import CoarseSpace, summed_if_small
-from fenics_contact.qp.problem import Dependence, FacePreconditioner, RowsOfFace
-from fenics_contact.qp.reductions import global_sum
+from fenics_contact.qp.coarse import CoarseSpace, SquareInverse, invert_square, summed_if_small
+from fenics_contact.qp.face import Face
+from fenics_contact.qp.problem import NO_SECOND_LEVEL, NoSecondLevel, Operator, SecondLevel
+from fenics_contact.qp.reductions import global_max, global_sum
 
 #: Residual after motions, owned, and the soft ones among these, shape (torn_size,).
 Moved = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
-class NoSoftMotions:
+class NoSoftMotions(NoSecondLevel):
     """Without foundations there are none.
 
     `scaled`: the coarse space of scaled multipliers λ / s; `factor`: s, owned, or one; `size`: of torn
@@ -51,10 +55,6 @@ class NoSoftMotions:
     factor: np.ndarray | float
     size: int
     count: ClassVar[int] = 0
-
-    def preconditioner(self, inner: InnerPreconditioner) -> FacePreconditioner:
-        """Return it as it is."""
-        return inner
 
     def coarse(self, restriction: sp.csr_matrix) -> CoarseSpace:
         """Return the coarse space of some scaled rows Z. Collective."""
@@ -75,7 +75,8 @@ class SoftMotions:
     """The soft motions of all subdomains, with those that float, in the scaled multipliers λ / s.
 
     `columns`: this rank's owned columns of G s, shape (m, n_owned); `stiffness`: S, zero of motions that
-    float, shape (m,); `flexibility`: f; `factor`: s, owned, or one; `modes`: R of the soft ones.
+    float, shape (m,); `flexibility`: f; `factor`: s, owned, or one; `modes`: R of the soft ones; `weight`: w
+    of rows, owned: forces that balance bodies belong into springs as little as these are stiff.
     """
 
     #: ω: by how much bonds of soft motions are more flexible than rows. Forces that cost little energy in
@@ -90,6 +91,7 @@ class SoftMotions:
     flexibility: float
     factor: np.ndarray | float
     modes: TornModes
+    weight: np.ndarray
 
     @classmethod
     def of(
@@ -98,6 +100,7 @@ class SoftMotions:
         floating: sp.csr_matrix,
         flexibility: float,
         factor: np.ndarray | float,
+        weight: np.ndarray,
     ) -> SoftMotions:
         """Return those of a torn system, with this rank's columns of its equilibrium. Collective."""
         subdomains, numbering, comm = torn.subdomains, torn.numbering, torn.numbering.comm
@@ -118,20 +121,44 @@ class SoftMotions:
         columns = sp.vstack([floating, numbering.sum_rows(sp.csr_matrix(moved.moved_by(torn.B))).T])
         columns = (columns @ sp.diags(factor * np.ones(columns.shape[1]))).tocsr()
         stiffness = np.concatenate([np.zeros(floating.shape[0]), *(every[number] for number in numbers)])
-        return cls(comm, columns, stiffness, flexibility, factor, moved)
+        return cls(comm, columns, stiffness, flexibility, factor, moved, weight)
 
     @property
     def count(self) -> int:
         """Number of motions that are soft."""
         return int(np.count_nonzero(self.stiffness))
 
+    @cached_property
+    def needed(self) -> bool:
+        """Whether there are soft motions or soft rows. Collective on first use."""
+        return self.count > 0 or global_max(self.comm, 1.0 - self.weight.min(initial=1.0)) > 0.0
+
     def coarse(self, restriction: sp.csr_matrix) -> CoarseSpace:
         """Return G Z with the inverse of G Z ZᵀGᵀ + T². Collective; `restriction`: Z, of scaled rows."""
         columns = (self.columns @ restriction).tocsr()
-        bonds = sp.diags((self.comm.rank == 0) * self.more_flexible * self.flexibility * self.stiffness)
-        share = (columns @ columns.T + bonds).tocsr()  # each rank has its own
-        gram = summed_if_small(self.comm, share)
+        gram = summed_if_small(self.comm, self.bonded(columns @ columns.T))
         return CoarseSpace(self.comm, columns, np.zeros(len(self.stiffness)), gram=gram)
+
+    def bonded(self, share: sp.spmatrix) -> sp.csr_matrix:
+        """Return this rank's share of a matrix G Gᵀ with T²."""
+        bonds = (self.comm.rank == 0) * self.more_flexible * self.flexibility * self.stiffness
+        return (share + sp.diags(bonds)).tocsr()
+
+    def on_face(self, face: Face) -> SecondLevel:
+        """Return the second level of a face; without soft motions there is none. Collective."""
+        if not self.needed:
+            return NO_SECOND_LEVEL
+        weight = face.damping**2 * (face.restriction.power(2).T @ self.weight)
+        return SoftMotionsOfFace.build(self, weight, face.restriction, face.restriction)
+
+    def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> SecondLevel:
+        """Return that of two bases, without damping. Collective."""
+        return SoftMotionsOfFace.build(self, tested.power(2).T @ self.weight, tested, moving)
+
+    def __call__(self, inner: Operator, residual: np.ndarray) -> np.ndarray:
+        """Return the preconditioned residual of all rows. Collective."""
+        every = sp.identity(self.columns.shape[1], format="csr")
+        return self.along(every, every)(inner, residual)
 
     def fitted(self, coarse: CoarseSpace, rows: sp.csr_matrix, residual: np.ndarray) -> Moved:
         """Return r after the motions that close rows best, at the price of their energy. Collective.
@@ -147,56 +174,42 @@ class SoftMotions:
         soft = self.columns[len(lacking) :] @ (change / self.factor)
         return np.concatenate([lacking, global_sum(self.comm, soft)])
 
-    def preconditioner(self, inner: InnerPreconditioner) -> FacePreconditioner:
-        """Return a preconditioner of floating subdomains as one of these, itself without soft motions."""
-        return TwoLevel(inner, self) if self.count else inner
-
-
-class InnerPreconditioner(FacePreconditioner, Protocol):
-    """A preconditioner whose faces know which of their rows depend on each other."""
-
-    def on_face(self, restriction: sp.csr_matrix) -> RowsOfFace:
-        """Return the preconditioner of the face with basis Z, shape (n_owned, n_face). Collective."""
-
 
 @dataclass(frozen=True, eq=False)
-class TwoLevel:
-    """The preconditioner of all rows."""
+class SoftMotionsOfFace:
+    """The second level of a face. `weight`: W; `tested`, `moving`: G of both bases; `inverse`: of Γ."""
 
-    inner: InnerPreconditioner
     motions: SoftMotions
+    weight: np.ndarray
+    tested: sp.csr_matrix
+    moving: CoarseSpace
+    inverse: SquareInverse
 
-    def __call__(self, residual: np.ndarray) -> np.ndarray:
-        """Return z, owned. Collective."""
-        return self._everywhere(residual)
+    @classmethod
+    def build(
+        cls, motions: SoftMotions, weight: np.ndarray, tested: sp.csr_matrix, moving: sp.csr_matrix
+    ) -> SecondLevel:
+        """Factor Γ; where it is singular, as bodies float, there is no second level. Collective."""
+        columns = (motions.columns @ tested).tocsr()
+        along = columns if moving is tested else (motions.columns @ moving).tocsr()
+        coarse = CoarseSpace(motions.comm, along, np.zeros(len(motions.stiffness)))
+        share = motions.bonded(along @ sp.diags(weight) @ columns.T)
+        diagonal = global_sum(motions.comm, share.diagonal())
+        scale = 1.0 / np.sqrt(np.maximum(np.abs(diagonal), np.finfo(float).tiny))
+        inverse = invert_square(motions.comm, share, scale)
+        return NO_SECOND_LEVEL if inverse is None else cls(motions, weight, columns, coarse, inverse)
 
-    @cached_property
-    def _everywhere(self) -> TwoLevelOfFace:
-        return self.on_face(sp.identity(self.motions.columns.shape[1], format="csr"))
+    def on_face(self, face: Face) -> SecondLevel:
+        """Return that of a face. Collective."""
+        return self.motions.on_face(face)
 
-    def on_face(self, restriction: sp.csr_matrix) -> TwoLevelOfFace:
-        """Return the preconditioner of the face with basis Z, shape (n_owned, n_face). Collective."""
-        inner, motions = self.inner.on_face(restriction), self.motions
-        return TwoLevelOfFace(inner, motions, restriction, motions.coarse(restriction))
+    def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> SecondLevel:
+        """Return that of two bases, with the damping of the face. Collective."""
+        return self.build(self.motions, self.weight, tested, moving)
 
-
-@dataclass(frozen=True, eq=False)
-class TwoLevelOfFace:
-    """The preconditioner of a face."""
-
-    inner: RowsOfFace
-    motions: SoftMotions
-    restriction: sp.csr_matrix
-    coarse: CoarseSpace
-
-    def __call__(self, residual: np.ndarray) -> np.ndarray:
-        """Return z, owned. Collective."""
-        Z, coarse, s = self.restriction, self.coarse, self.motions.factor
-        given = coarse.coefficients(Z.T @ (s * residual))
-        solved = Z.T @ (self.inner(residual - Z @ coarse.transpose(given) / s) / s)
-        left = coarse.solve(coarse.apply(solved) - self.motions.stiffness * given)
-        return np.asarray(s * (Z @ (solved - coarse.transpose(left))))
-
-    def contradiction(self, residual: np.ndarray) -> Dependence | None:
-        """Return what no force on the face's rows changes, see `qp.RowsOfFace`. Collective."""
-        return self.inner.contradiction(residual)
+    def __call__(self, inner: Operator, residual: np.ndarray) -> np.ndarray:
+        """Return z. Collective."""
+        given = self.inverse.solve(self.moving.apply(self.weight * residual))
+        solved = inner(residual - self.tested.T @ given)
+        left = self.inverse.solve(self.moving.apply(solved) - self.motions.stiffness * given)
+        return np.asarray(solved - self.weight * (self.tested.T @ left))

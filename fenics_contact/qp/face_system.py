@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,14 @@ from fenics_contact.qp.coarse import (
     plus,
 )
 from fenics_contact.qp.face import Face
-from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator, ShiftedOperator
+from fenics_contact.qp.problem import (
+    NO_SECOND_LEVEL,
+    DualProblem,
+    FacePreconditioner,
+    Operator,
+    SecondLevel,
+    ShiftedOperator,
+)
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 
@@ -31,7 +38,8 @@ class FaceSystem:
     `operator`: F, owned to owned, collective; `preconditioner`: approximation of F⁻¹, owned to owned, or
     None; `patience`: iterations without progress after which an inner solver gives up; `spring`: 1/ρ of the
     discs is the diagonal of F divided by this, as for springs of proximal points; `single`: whether Krylov
-    methods store directions in single precision, as F is no more accurate.
+    methods store directions in single precision, as F is no more accurate; `second_level`: corrects the
+    preconditioner where bodies are held softly.
     """
 
     comm: MPI.Comm
@@ -42,12 +50,17 @@ class FaceSystem:
     patience: int = 60
     spring: float = 1.0
     single: bool = False
+    second_level: SecondLevel = NO_SECOND_LEVEL
 
     def image(self, y: Vector, full: Vector) -> Vector:
         """Return A y, shape (n_face,), for y on the face and full = F Z y, owned."""
         return self.face.restrict(full) + self.face.curvature * y
 
     def precondition(self, residual: Vector) -> Vector:
+        """Approximate A⁻¹ r, shape (n_face,). Collective."""
+        return self.second_level(self._by_rows, residual)
+
+    def _by_rows(self, residual: Vector) -> Vector:
         """Apply D Zᵀ M Z D, where D = (1 + ρκ)^-½ accounts for the curvature of the discs. Collective.
 
         Compliances κ far beyond F, and those of rows that supports alone determine, add their own inverses.
@@ -114,7 +127,7 @@ class FaceSystems:
         spring = self._operator.stiffness if isinstance(self._operator, ShiftedOperator) else 1.0
         return FaceSystem(
             problem.comm, face, self._operator, restricted, preconditioner,
-            spring=spring, single=problem.exact is not None,
+            spring=spring, single=problem.exact is not None, second_level=problem.second_level.on_face(face),
         )  # fmt: skip
 
 
@@ -234,6 +247,7 @@ class CoupledSystem:
         with all equality rows, see `CoarseSpace.restricted`; `least_damping`: lower bound on D, so that
         motions that only offsets resist stay distinct from unresisted ones.
         """
+        system = replace(system, second_level=system.second_level.along(tested, moving))
         known = whole and tested is system.face.restriction
         columns = system.coarse.matrix if known else coarse.columns(tested, whole=whole)
         faces, shared = coarse.faces if whole else None, len(system.face.layout.equality)

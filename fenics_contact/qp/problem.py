@@ -117,6 +117,39 @@ class CompliantRows:
 NO_COMPLIANT_ROWS = CompliantRows(np.zeros(0, dtype=np.int64), np.zeros(0))
 
 
+@runtime_checkable
+class SecondLevel(Protocol):
+    """A coarse space beside that of equilibrium, for the preconditioner of a face."""
+
+    def on_face(self, face: Face) -> SecondLevel:
+        """Return that of a face. Collective."""
+
+    def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> SecondLevel:
+        """Return that of a step which moves along another basis than it is tested with. Collective."""
+
+    def __call__(self, inner: Operator, residual: Vector) -> Vector:
+        """Return the preconditioned residual of a face with an inner preconditioner of it. Collective."""
+
+
+class NoSecondLevel:
+    """Equilibrium alone is enough."""
+
+    def on_face(self, face: Face) -> NoSecondLevel:
+        """Return itself."""
+        return self
+
+    def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> NoSecondLevel:
+        """Return itself."""
+        return self
+
+    def __call__(self, inner: Operator, residual: Vector) -> Vector:
+        """Apply the inner preconditioner. Collective."""
+        return inner(residual)
+
+
+NO_SECOND_LEVEL = NoSecondLevel()
+
+
 def unknown_reach(multiplier: Vector, alpha: Vector) -> Vector:
     """Return zeros, owned: displacements are not known."""
     return np.zeros_like(multiplier)
@@ -150,6 +183,7 @@ class DualProblem:
             does not matter where bodies without forces are.
         exact: F in double precision, owned to owned, collective, where `operator` is in single precision and
             only directions and images of Krylov methods are computed by it; None where it is exact itself.
+        second_level: A coarse space of motions that are resisted, but little, in scaled multipliers.
     """
 
     comm: MPI.Comm
@@ -168,6 +202,7 @@ class DualProblem:
     least: LeastSizes = LeastSizes()
     exact: Operator | None = None
     given: Vector | None = None
+    second_level: SecondLevel = NO_SECOND_LEVEL
 
     @cached_property
     def between_supports(self) -> Marks:
