@@ -235,7 +235,7 @@ Master: TypeAlias = Annotated[
         "obstacle",
         *OBSTACLES,
         other=SurfaceOfBody,
-        when=lambda table: "obstacle" not in table,
+        when=lambda table: "obstacle" not in table and not {"body", "surface"}.isdisjoint(table),
     ),
 ]
 AnyFriction: TypeAlias = Annotated[Any, one_of("law", *FRICTION_LAWS)]

@@ -88,6 +88,11 @@ def test_several_mistakes_are_all_listed_in_the_order_of_their_lines(tmp_path: P
             "master = { obstacle = 'distance', formula = '1/0' } #",
             "line 39: contacts.0.master.formula",
         ),
+        (
+            "master = {",
+            "master = { type = 'plane' } #",
+            "line 39: contacts.0.master must have 'obstacle', one of 'plane', 'sphere', ",
+        ),
         ("value = [10.0,", "value = ['x # y',", "loads.0.value: a formula must be like '0.1 * x**2', got"),
         ("value = [10.0,", "value = ['1e400',", "loads.0.value: a formula may hold numbers"),
         ("2.1e5", "1" + 5000 * "0", "line 16: must be TOML, got 'young_modulus = 1000"),
