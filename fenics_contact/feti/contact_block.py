@@ -138,10 +138,13 @@ class ContactBlock:
             basis = sp.csr_matrix((value, (row, where)), shape=(self._gram.shape[0], int(starts[-1])))
         return _BlockOfFace(self._holder, self._gram, self._soft, basis)
 
-    def softened(self, soft: np.ndarray) -> ContactBlock:
-        """Return the block with marks of rows that give way, owned, and contradict no other. Collective."""
-        marks = self._holder.gathered(soft.astype(np.float64)) > 0.0
-        return ContactBlock(self._holder, self._gram, marks)
+    def softened(self, compliance: np.ndarray) -> ContactBlock:
+        """Return the block B D⁻¹ Bᵀ + C of rows that give way, which contradict no other. Collective.
+
+        `compliance`: C on all rows, owned, zero on those that do not.
+        """
+        added = self._holder.gathered(compliance)
+        return ContactBlock(self._holder, (self._gram + sp.diags(added)).tocsr(), added > 0.0)
 
     def solve(self, x: np.ndarray) -> np.ndarray:
         """Return the solution on these rows, zero on those that are not on the face. Collective."""

@@ -36,11 +36,12 @@ from fenics_contact.qp.problem import (
 
 
 class DirichletPreconditioner:
-    """M = (B D⁻¹ Bᵀ)⁻¹ B D⁻¹ S D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹, S the Schur complement of each K_s on its interface.
+    """M = A⁻¹ (B D⁻¹ S D⁻¹ Bᵀ + C) A⁻¹ with A = B D⁻¹ Bᵀ + C, S the Schur complements on the interfaces.
 
-    D is the typical stiffness at each copy of a node, so that of two neighbours the softer one deforms.
-    Gluing and Dirichlet rows are orthogonal in D⁻¹: B D⁻¹ Bᵀ is diagonal except for the rows of contacts and
-    ties, where it is factored.
+    D is the typical stiffness at each copy of a node, so that of two neighbours the softer one deforms. C is
+    the compliance of rows that give way: a jump is closed by bodies and springs, each as it is soft. Gluing
+    and Dirichlet rows are orthogonal in D⁻¹: A is diagonal except for the rows of contacts and ties, where it
+    is factored.
 
     References:
         Farhat, Roux: An unconventional domain decomposition method for an efficient parallel solution of
@@ -65,34 +66,37 @@ class DirichletPreconditioner:
         diagonal = numbering.to_owned(np.asarray(B.multiply(self._B).sum(axis=1)).ravel())
         self._equality = 1.0 / np.where(numbering.owned < n_gluing, diagonal, 1.0)
         self._contact = ContactBlock.of_rows(B, self._B, numbering, n_gluing)
+        self._softened = self._contact
 
     def __call__(self, residual: np.ndarray) -> np.ndarray:
         """Return M r for an owned vector. Collective."""
-        return self._apply(residual, self._contact)
+        return self._apply(residual, self._softened)
 
     def on_face(self, restriction: sp.csr_matrix) -> PreconditionerOfFace:
         """Return the preconditioner of a face; only its rows enter B D⁻¹ Bᵀ. Collective.
 
         Rows that are not on the face would stiffen their neighbours, the more the stiffer the slave.
         """
-        return PreconditionerOfFace(self, self._contact.on_face(restriction))
+        return PreconditionerOfFace(self, self._softened.on_face(restriction))
 
     def lifting(self, restriction: sp.csr_matrix) -> Lifting:
         """Return the displacements of the interface that close rows of a face. Collective."""
         return Lifting(self, self._contact.on_face(restriction))
 
-    def soften(self, rows: np.ndarray, compliance: np.ndarray) -> None:
-        """Add 1 / C on rows that give way, which move nothing or depend on each other. Collective."""
-        self._soft, self._sprung = rows, 1.0 / compliance
-        marks = np.zeros(len(self._equality), dtype=bool)
-        marks[rows] = True
-        self._contact = self._contact.softened(marks)
+    def soften(self, rows: np.ndarray, compliance: np.ndarray, unit: float) -> None:
+        """Let rows give way by C. Collective; `unit`: the stiffness of which D is a part."""
+        self._soft, self._sprung = rows, unit**2 * compliance
+        added = np.zeros(len(self._equality))
+        added[rows] = unit * compliance
+        self._softened = self._contact.softened(added)
 
     def _apply(self, residual: np.ndarray, contact: ContactBlock) -> np.ndarray:
         count_flops(self._numbering.comm, self._inverse.flops[1] + 4 * self._B.nnz)
-        result = self._force(self._inverse.apply_stiffness(self._jump(residual, contact)), contact)
-        result[self._soft] += self._sprung * residual[self._soft]
-        return result
+        forces = contact.solve(self._equality * residual)
+        stiffened = self._inverse.apply_stiffness(self._Bt @ self._numbering.to_local(forces))
+        jump = self._numbering.to_owned(self._B @ stiffened)
+        jump[self._soft] += self._sprung * forces[self._soft]
+        return self._equality * contact.solve(jump)
 
     def _jump(self, residual: np.ndarray, contact: ContactBlock) -> np.ndarray:
         """Return D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹ r on the interface. Collective."""
@@ -266,7 +270,7 @@ class DualSystem:
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
             if torn.groups.compliance.any():
-                preconditioner.soften(torn.compliance.soft, torn.compliance.constant)
+                preconditioner.soften(torn.compliance.soft, torn.compliance.constant, self._stiffest)
             diagonal, supported = self._diagonal()
             self.preconditioner, scaling = preconditioner, self._scaling(coarse)
             self.soft_motions = self._soft_motions(coarse, scaling)
@@ -526,15 +530,19 @@ class DualSystem:
         return SoftMotions.of(self.torn, coarse.matrix, typical, factor, weight)
 
     @cached_property
+    def _stiffest(self) -> float:
+        """The typical stiffness of the stiffest subdomain, of which D is a part. Collective on first use."""
+        own = max((part.typical_stiffness for part in self.torn.subdomains), default=0.0)
+        return float(self.torn.numbering.comm.allreduce(own, op=MPI.MAX))
+
+    @cached_property
     def flexibility(self) -> np.ndarray:
         """How far bodies give way to a force in each row b of B, b D⁻¹ bᵀ, owned, [length / force].
 
         Collective on first use.
         """
         B, numbering = self._B_interface, self.torn.numbering
-        stiffest = max((part.typical_stiffness for part in self.torn.subdomains), default=0.0)
-        unit = numbering.comm.allreduce(stiffest, op=MPI.MAX)
-        return np.asarray(numbering.to_owned(np.asarray(B.multiply(B) @ self._compliance())) / unit)
+        return np.asarray(numbering.to_owned(np.asarray(B.multiply(B) @ self._compliance())) / self._stiffest)
 
     def _diagonal(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the diagonal of F on contact rows, one elsewhere, and marks of filled rows. Collective."""

@@ -36,7 +36,7 @@ from fenics_contact.feti.kernel_basis import TornModes
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.coarse import CoarseSpace, SquareInverse, invert_square, summed_if_small
 from fenics_contact.qp.face import Face
-from fenics_contact.qp.problem import NO_SECOND_LEVEL, NoSecondLevel, Operator, SecondLevel
+from fenics_contact.qp.problem import NO_SECOND_LEVEL, NoSecondLevel, Operator, SecondLevelOfFace
 from fenics_contact.qp.reductions import global_max, global_sum
 
 #: Residual after motions, owned, and the soft ones among these, shape (torn_size,).
@@ -144,21 +144,12 @@ class SoftMotions:
         bonds = (self.comm.rank == 0) * self.more_flexible * self.flexibility * self.stiffness
         return (share + sp.diags(bonds)).tocsr()
 
-    def on_face(self, face: Face) -> SecondLevel:
+    def on_face(self, face: Face) -> SecondLevelOfFace:
         """Return the second level of a face; without soft motions there is none. Collective."""
         if not self.needed:
             return NO_SECOND_LEVEL
         weight = face.damping**2 * (face.restriction.power(2).T @ self.weight)
         return SoftMotionsOfFace.build(self, weight, face.restriction, face.restriction)
-
-    def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> SecondLevel:
-        """Return that of two bases, without damping. Collective."""
-        return SoftMotionsOfFace.build(self, tested.power(2).T @ self.weight, tested, moving)
-
-    def __call__(self, inner: Operator, residual: np.ndarray) -> np.ndarray:
-        """Return the preconditioned residual of all rows. Collective."""
-        every = sp.identity(self.columns.shape[1], format="csr")
-        return self.along(every, every)(inner, residual)
 
     def fitted(self, coarse: CoarseSpace, rows: sp.csr_matrix, residual: np.ndarray) -> Moved:
         """Return r after the motions that close rows best, at the price of their energy. Collective.
@@ -188,7 +179,7 @@ class SoftMotionsOfFace:
     @classmethod
     def build(
         cls, motions: SoftMotions, weight: np.ndarray, tested: sp.csr_matrix, moving: sp.csr_matrix
-    ) -> SecondLevel:
+    ) -> SecondLevelOfFace:
         """Factor Γ; where it is singular, as bodies float, there is no second level. Collective."""
         columns = (motions.columns @ tested).tocsr()
         along = columns if moving is tested else (motions.columns @ moving).tocsr()
@@ -199,13 +190,15 @@ class SoftMotionsOfFace:
         inverse = invert_square(motions.comm, share, scale)
         return NO_SECOND_LEVEL if inverse is None else cls(motions, weight, columns, coarse, inverse)
 
-    def on_face(self, face: Face) -> SecondLevel:
-        """Return that of a face. Collective."""
-        return self.motions.on_face(face)
-
-    def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> SecondLevel:
+    def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> SecondLevelOfFace:
         """Return that of two bases, with the damping of the face. Collective."""
         return self.build(self.motions, self.weight, tested, moving)
+
+    def balancing(self, coarse: CoarseSpace, resultant: np.ndarray) -> np.ndarray:
+        """Return y of a face with G Z y = resultant that costs little energy. Collective."""
+        wanted = np.zeros(len(self.motions.stiffness))
+        wanted[: len(resultant)] = resultant
+        return self.weight * (self.tested.T @ self.inverse.solve(wanted))
 
     def __call__(self, inner: Operator, residual: np.ndarray) -> np.ndarray:
         """Return z. Collective."""

@@ -25,7 +25,7 @@ from fenics_contact.qp.problem import (
     DualProblem,
     FacePreconditioner,
     Operator,
-    SecondLevel,
+    SecondLevelOfFace,
     ShiftedOperator,
 )
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
@@ -50,7 +50,7 @@ class FaceSystem:
     patience: int = 60
     spring: float = 1.0
     single: bool = False
-    second_level: SecondLevel = NO_SECOND_LEVEL
+    second_level: SecondLevelOfFace = NO_SECOND_LEVEL
 
     def image(self, y: Vector, full: Vector) -> Vector:
         """Return A y, shape (n_face,), for y on the face and full = F Z y, owned."""
@@ -82,7 +82,7 @@ class FaceSystem:
         on_face = self.face.nearest(multiplier)
         y = self.face.restrict(on_face)
         missing = self.coarse.residual(y)
-        return on_face - self.face.prolong(self.coarse.transpose(self.coarse.solve(missing)))
+        return on_face - self.face.prolong(self.second_level.balancing(self.coarse, missing))
 
     def advance(self, step: Vector) -> Vector:
         """Return the change of the multiplier, Z δ, owned, for a step δ in face coordinates."""

@@ -117,18 +117,24 @@ class CompliantRows:
 NO_COMPLIANT_ROWS = CompliantRows(np.zeros(0, dtype=np.int64), np.zeros(0))
 
 
-@runtime_checkable
 class SecondLevel(Protocol):
-    """A coarse space beside that of equilibrium, for the preconditioner of a face."""
+    """A coarse space beside that of equilibrium, for preconditioners of faces."""
 
-    def on_face(self, face: Face) -> SecondLevel:
+    def on_face(self, face: Face) -> SecondLevelOfFace:
         """Return that of a face. Collective."""
 
-    def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> SecondLevel:
+
+class SecondLevelOfFace(Protocol):
+    """What a second level adds to the preconditioner of a face."""
+
+    def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> SecondLevelOfFace:
         """Return that of a step which moves along another basis than it is tested with. Collective."""
 
+    def balancing(self, coarse: CoarseSpace, resultant: Vector) -> Vector:
+        """Return y of the face with G Z y = resultant that costs little energy. Collective."""
+
     def __call__(self, inner: Operator, residual: Vector) -> Vector:
-        """Return the preconditioned residual of a face with an inner preconditioner of it. Collective."""
+        """Return the preconditioned residual of the face with an inner preconditioner of it. Collective."""
 
 
 class NoSecondLevel:
@@ -141,6 +147,10 @@ class NoSecondLevel:
     def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> NoSecondLevel:
         """Return itself."""
         return self
+
+    def balancing(self, coarse: CoarseSpace, resultant: Vector) -> Vector:
+        """Return the shortest one. Collective."""
+        return coarse.transpose(coarse.solve(resultant))
 
     def __call__(self, inner: Operator, residual: Vector) -> Vector:
         """Apply the inner preconditioner. Collective."""

@@ -79,9 +79,9 @@ def strain(state: LinearState, change: np.ndarray) -> float:
 
 
 def lengths(state: LinearState) -> np.ndarray:
-    """By how much springs of bodies and tools are longer."""
-    given, solution = state.dual.problem.compliant, state.dual_solution
-    return given.compliance * solution.multiplier[given.rows] - solution.residual[given.rows]
+    """By how much springs are longer under their forces."""
+    given = state.dual.problem.compliant
+    return given.compliance * state.dual_solution.multiplier[given.rows]
 
 
 def distance(state: LinearState, exact: LinearState) -> float:
