@@ -1,8 +1,8 @@
 """Solvers for the dual problem of contact: quadratic, with equilibrium, bounds and friction discs.
 
 The problem (`DualProblem`) is an operator, a coarse space and a layout; a solver (`InTurn`,
-`FaceNewton`, `Smalse`, `ProjectedCG`) holds only its parameters; `solve` joins them to a `DualSolution` or
-raises. Vectors are distributed over the ranks of the problem's communicator.
+`FaceNewton`, `Smalse` with `Mpgp` inside, `ProjectedCG`) holds only its parameters; `solve` joins them to a
+`DualSolution` or raises. Vectors are distributed over the ranks of the problem's communicator.
 """
 
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fenics_contact.qp.in_turn import InTurn
     from fenics_contact.qp.krylov import Stop
     from fenics_contact.qp.problem import DualProblem, FacePreconditioner
-    from fenics_contact.qp.smalse import Smalse
+    from fenics_contact.qp.smalse import Mpgp, Smalse
     from fenics_contact.qp.solution import DualSolution, Residuals, Start, measure
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "FacePreconditioner",
     "FeasibleSet",
     "InTurn",
+    "Mpgp",
     "ProjectedCG",
     "Residuals",
     "SlidingError",

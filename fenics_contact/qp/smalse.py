@@ -29,14 +29,44 @@ from fenics_contact.qp.solution import (
 
 @dataclass(frozen=True)
 class Mpgp:
-    """Parameters of the method.
+    """Modified proportioning with gradient projections: the inner iteration of `Smalse`.
 
-    `expansion`: fixed step ᾱ of the gradient projection times ‖A‖, below 2; `proportioning`: Γ; active
-    constraints are released once the chopped gradient exceeds Γ times the free one.
+    It minimises ½ xᵀA x − bᵀx over bounds and discs: conjugate gradients on the free variables, gradient
+    projections of fixed length ᾱ where the set of active constraints changes. The defaults suit all problems,
+    as `Smalse` scales A to ‖A‖ = 1.
+
+    Attributes:
+        expansion: ᾱ‖A‖, the length of gradient projections, in (0, 2): any of them decreases the quadratic.
+        proportioning: Γ > 0. A gradient projection releases active constraints once their chopped gradient
+            is more than Γ times the free one, in reduced norms. A larger Γ stays on a face for longer.
+
+    Raises:
+        InvalidInputError: A parameter is out of its range.
+
+    Example:
+        >>> careful = Smalse(tolerance=1e-8, mpgp=Mpgp(expansion=1.0))
+        >>> careful.mpgp.proportioning
+        1.0
+
+    References:
+        Z. Dostál, T. Kozubek, An optimal algorithm and superrelaxation for minimization of a quadratic
+        function subject to separable convex constraints with applications, Math. Program. 135 (2012).
     """
 
     expansion: float = 1.9
     proportioning: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the ranges for which convergence is proven."""
+        _require_between("expansion of Mpgp, ᾱ‖A‖,", self.expansion, 2.0)
+        _require_between("proportioning of Mpgp, Γ,", self.proportioning, np.inf)
+
+
+def _require_between(name: str, value: float, upper: float) -> None:
+    """Raise unless 0 < value < upper."""
+    if not 0.0 < value < upper:
+        limit = str(upper).replace("inf", "∞")
+        raise InvalidInputError(f"{name} must be in (0, {limit}), got {value}: leave it out for the default")
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,11 +292,18 @@ class Smalse:
     Attributes:
         tolerance: Every residual of `Residuals` ends below it.
         max_products: Give up after that many F-products.
-        balance: First M: the inner iteration stops at ‖projected gradient‖ ≤ M·(equilibrium error).
-        loosest: η: but not before ‖projected gradient‖ ≤ η‖b‖.
-        balance_reduction: Factor on M when the Lagrangian increases too little.
+        balance: First M > 0: the inner iteration stops at ‖projected gradient‖ ≤ M·(equilibrium error).
+        loosest: η > 0: but not before ‖projected gradient‖ ≤ η‖b‖.
+        balance_reduction: 1/β in (0, 1), the factor on M when the Lagrangian increases too little.
         mpgp: Parameters of the inner iteration.
         rounded: Least tolerance where products are in single precision.
+
+    Raises:
+        InvalidInputError: M or η is not positive, or the factor on M not in (0, 1).
+
+    Example:
+        >>> FixedPoint(Smalse(tolerance=1e-8, balance=0.5)).tolerance  # for Coulomb's law
+        1e-08
 
     References:
         Z. Dostál, T. Kozubek, M. Sadowská, V. Vondrák, Scalable Algorithms for Contact Problems,
@@ -280,6 +317,12 @@ class Smalse:
     balance_reduction: float = 0.1
     mpgp: Mpgp = field(default_factory=Mpgp)
     rounded: float = 1e-5
+
+    def __post_init__(self) -> None:
+        """Check the ranges for which convergence is proven."""
+        _require_between("balance of Smalse, M,", self.balance, np.inf)
+        _require_between("loosest of Smalse, η,", self.loosest, np.inf)
+        _require_between("balance_reduction of Smalse, 1/β,", self.balance_reduction, 1.0)
 
     def with_tolerance(self, tolerance: float) -> Smalse:
         """Return the solver with another tolerance."""
