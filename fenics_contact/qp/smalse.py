@@ -118,9 +118,9 @@ def minimise(
     target: Callable[[Vector], float],
     *,
     parameters: Mpgp,
-    max_iterations: int,
+    max_products: int,
 ) -> BoundedMinimum:
-    """Minimise a quadratic over bounds and discs by MPGP. Collective.
+    """Minimise a quadratic over bounds and discs by MPGP, with one product more at most. Collective.
 
     While the chopped gradient β is dominated by the free gradient φ, the iteration moves by conjugate
     gradients on the free variables; a CG step that would leave the set is cut at the boundary and followed by
@@ -135,9 +135,10 @@ def minimise(
     gradient = quadratic.gradient(x)
     split = _split(quadratic, x, gradient, step, parameters)
     direction = split.free
-    for iteration in range(max_iterations):
-        if split.projected <= target(x):
-            return BoundedMinimum(x, gradient, split.projected, iteration, True)
+    iterations, products = 0, 1
+    while not (reached := split.projected <= target(x)) and products < max_products:
+        iterations += 1
+        products += 1
         if split.proportional:  # 1. x is proportional: a trial step of conjugate gradients
             image = quadratic.operator(direction)
             slope, curvature = global_sum(quadratic.comm, gradient @ direction, direction @ image)
@@ -152,13 +153,13 @@ def minimise(
             # 3. Not feasible: as far as the boundary, then expansion by the projection below.
             limit = limit if np.isfinite(limit) else 0.0
             x, gradient = x - limit * direction, gradient - limit * image
+            products += 1
         # 4. Expansion, or proportioning where x is not proportional.
         x = quadratic.projected_step(x, gradient, step)
         gradient = quadratic.gradient(x)
         split = _split(quadratic, x, gradient, step, parameters)
         direction = split.free
-    reached = split.projected <= target(x)
-    return BoundedMinimum(x, gradient, split.projected, max_iterations, reached)
+    return BoundedMinimum(x, gradient, split.projected, iterations, reached)
 
 
 def _split(quadratic: BoundedQuadratic, x: Vector, gradient: Vector, step: float, parameters: Mpgp) -> _Split:
@@ -405,7 +406,7 @@ def outer_iterations(problem: DualProblem, start: Start, parameters: Smalse) -> 
             x,
             lagrangian.stopping_rule(balance, parameters.loosest, caution * floor),
             parameters=parameters.mpgp,
-            max_iterations=max(parameters.max_products - start.operator.products, 1),
+            max_products=max(parameters.max_products - start.operator.products, 1),
         )
         x, residual = minimum.x, lagrangian.norm * minimum.gradient
         # 2. M falls where the Lagrangian has not risen enough. 3. The multiplier of equilibrium.

@@ -546,7 +546,7 @@ def test_more_directions_than_the_first_block_holds():
 def minimum(A, b, feasible, start=None, target=1e-12, **parameters):
     quadratic = BoundedQuadratic(MPI.COMM_SELF, lambda x: A @ x, b, feasible, np.linalg.norm(A, 2))
     start = np.zeros(len(b)) if start is None else start
-    return minimise(quadratic, start, lambda x: target, parameters=Mpgp(**parameters), max_iterations=2000)
+    return minimise(quadratic, start, lambda x: target, parameters=Mpgp(**parameters), max_products=2000)
 
 
 def test_nonnegative_least_squares_agrees_with_lawson_and_hanson():
@@ -603,20 +603,22 @@ def test_iterates_stay_in_the_set_and_the_gradient_is_honest():
     assert 0 < found.projected <= 1e-3
 
 
-def test_the_limit_of_iterations_of_mpgp_is_reported():
-    problem = random_problem(9, m=0)
+@pytest.mark.parametrize("limit", [3, 8, 20])
+def test_the_limit_of_products_of_mpgp_is_kept_and_reported(limit):
+    problem, counted = random_problem(9, m=0), []
     quadratic = BoundedQuadratic(
         MPI.COMM_SELF,
-        lambda x: problem.F @ x,
+        lambda x: counted.append(1) or problem.F @ x,
         problem.d,
         FeasibleSet(problem.layout, problem.slip_bound),
         10.0,
     )
     found = minimise(
-        quadratic, np.zeros(len(problem.d)), lambda x: 1e-12, parameters=Mpgp(), max_iterations=3
+        quadratic, np.zeros(len(problem.d)), lambda x: 1e-12, parameters=Mpgp(), max_products=limit
     )
     assert not found.reached
-    assert found.iterations == 3
+    assert limit <= len(counted) <= limit + 1
+    assert 0 < found.iterations < limit
 
 
 @pytest.mark.parametrize("n", [1, 4, 60])

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.qp import Mpgp, Smalse
+from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.qp import Mpgp, Smalse, solve
+from tests.qp.random_problems import random_problem
 
 NAN = float("nan")
 
@@ -37,3 +38,14 @@ def test_parameters_without_a_proof_of_convergence_are_refused(
 
 def test_parameters_within_their_ranges_are_taken() -> None:
     assert Smalse(mpgp=Mpgp(1e-3, 1e3), balance=1e-3, balance_reduction=0.999).mpgp.expansion == 1e-3
+
+
+@pytest.mark.parametrize("seed", range(1, 5))
+@pytest.mark.parametrize("most", [20, 40, 100])
+def test_no_more_products_are_used_than_allowed(seed: int, most: int) -> None:
+    """But the second one of a last gradient projection; it used to be up to 70 % more."""
+    problem = random_problem(seed, n_contact=60)
+    solver = Smalse(tolerance=1e-12, max_products=most, loosest=1e-13)
+    with pytest.raises(ConvergenceError, match="raise max_products") as caught:
+        solve(problem.dual, problem.slip_bound, solver)
+    assert most <= caught.value.history[-1].products <= most + 1
