@@ -52,7 +52,7 @@ from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.bisection import bisection_partition
 from fenics_contact.mesh.partition import box_partition, check_one_piece
 from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
-from fenics_contact.qp.smalse import Smalse
+from fenics_contact.qp.smalse import Mpgp, Smalse
 from fenics_contact.qp.solve import DualSolver
 
 if TYPE_CHECKING:
@@ -100,6 +100,31 @@ class NewtonPart(Part):
         return AutomaticSteps(TangentNewton(**given), **parts)
 
 
+class SmalsePart(Part):
+    """Parameters of method = "smalse", augmented Lagrangians around gradient projections."""
+
+    balance: PositiveFloat = Field(
+        default=Smalse.balance, description="M: projected gradient over equilibrium error at first"
+    )
+    loosest: PositiveFloat = Field(
+        default=Smalse.loosest, description="η: projected gradient over right side at most"
+    )
+    balance_reduction: float = Field(
+        default=Smalse.balance_reduction, gt=0, lt=1, description="1/β: factor on M"
+    )
+    expansion: float = Field(
+        default=Mpgp.expansion, gt=0, lt=2, description="ᾱ‖A‖: length of gradient projections"
+    )
+    proportioning: PositiveFloat = Field(
+        default=Mpgp.proportioning, description="Γ: chopped over free gradient at most, on a face"
+    )
+
+    def made(self) -> Smalse:  # type: ignore[override]
+        """Return the solver of Python with the tolerance and the products of its own defaults."""
+        given = self.model_dump()
+        return Smalse(mpgp=Mpgp(given.pop("expansion"), given.pop("proportioning")), **given)
+
+
 BALANCED = "balanced"
 
 
@@ -127,6 +152,7 @@ class SolverPart(Part):
     max_products: PositiveInt | None = Field(
         default=None, description="give up after that many products with F"
     )
+    smalse: SmalsePart = Field(default=SmalsePart(), description='parameters of method = "smalse"')
     newton: NewtonPart | None = Field(
         default=None, description="how loads on nonlinear materials are followed, in parts"
     )
@@ -164,9 +190,13 @@ class SolverPart(Part):
                 f"method {self.method!r} and max_products {self.max_products}: leave them out, or set "
                 "'newton'"
             )
+        if "smalse" in self.model_fields_set and self.method != "smalse":
+            raise InvalidInputError(
+                f'smalse has parameters of method = "smalse", got method {self.method!r}: leave one out'
+            )
         kinds: dict[str, DualSolver] = {
             "face_newton": FaceNewton(),
-            "smalse": Smalse(),
+            "smalse": self.smalse.made(),
             "projected_cg": ProjectedCG(),
         }
         solver = kinds.get(self.method)

@@ -88,7 +88,7 @@ bodies.t = { mesh = "t", material = "s" }
 supports = [{ body = "p", surface = "bottom" }]
 loads = [{ kind = "body_force", body = "b", value = ["x", 0, "1e-3*z"] }]
 ties = [{ slave = { body = "t", surface = "x0" }, master = { body = "p", surface = "x1" }, sliding = true }]
-solver = { method = "smalse", max_products = 1000, subdomains = { p = 2, t = [2, 1, 1] } }
+solver = { method = "smalse", max_products = 1000, smalse.balance = 2, subdomains = { p = 2, t = [2, 1, 1] } }
 output = { folder = "out", files = ["vtu", "xdmf"], pictures = ["status"], checkpoint = false }
 
 [meshes.p]

@@ -38,6 +38,7 @@ from fenics_contact.materials import (
     plastic,
     temperature_dependent,
 )
+from fenics_contact.qp import Mpgp, Smalse
 from fenics_contact.shapes import Box, Cone
 from tests.scene_file.texts import GOOD, changed
 
@@ -638,3 +639,38 @@ def test_steps_turn_a_rigid_surface() -> None:
 def test_a_rigid_surface_that_is_none_is_refused(given: dict[str, Any], words: str) -> None:
     with pytest.raises(SceneFileError, match=words):
         _ = file_with_rigid_surface(supports=[{**RIGID, **given}]).scene
+
+
+# Parameters of a dual solver.
+SMALSE = {"balance": 0.5, "loosest": 0.2, "balance_reduction": 0.5, "expansion": 1.0, "proportioning": 2.0}
+
+
+def test_smalse_has_the_parameters_of_its_table() -> None:
+    pressed = {
+        "supports": [{"body": "a", "surface": "z1"}],
+        "contacts": [{"slave": {"body": "a", "surface": "z0"}, "master": FLOOR}],
+        "loads": [{"kind": "traction", "body": "a", "surface": "x1", "value": [5, 0, -5]}],
+    }
+    given = {"method": "smalse", "tolerance": 1e-8, "subdomains": [2, 1, 1]}
+    found = file_of(**pressed, solver={**given, "smalse": SMALSE})
+    wanted = Smalse(balance=0.5, loosest=0.2, balance_reduction=0.5, mpgp=Mpgp(1.0, 2.0))
+    assert found.problem.solver == wanted
+    plain = file_of(**pressed, solver=given)
+    assert plain.problem.solver == Smalse()
+    one, other = found.problem.solve().energies.strain, plain.problem.solve().energies.strain
+    assert one == pytest.approx(other, rel=1e-7)
+    assert one > 0.0
+
+
+@pytest.mark.parametrize(
+    ("solver", "message"),
+    [
+        ({"smalse": {"balance": 0.5}}, "smalse has parameters of method = \"smalse\", got method 'auto'"),
+        ({"method": "smalse", "smalse": {"expansion": 2.0}}, "expansion must be a number .* 2, got 2"),
+        ({"method": "smalse", "smalse": {"balance_reduction": 1}}, "balance_reduction must be a number .* 1"),
+        ({"method": "smalse", "smalse": {"gamma": 1}}, "solver.smalse.gamma is not known"),
+    ],
+)
+def test_parameters_of_smalse_that_it_does_not_take(solver: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneFileError, match=message):
+        _ = file_of(supports=[{"body": "a", "surface": "z1"}], solver=solver).problem
