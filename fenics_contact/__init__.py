@@ -80,7 +80,7 @@ if TYPE_CHECKING:
     from fenics_contact._large_deformations.load_steps import AutomaticSteps as AutomaticSteps
     from fenics_contact._large_deformations.newton import TangentNewton as TangentNewton
     from fenics_contact._optimize.bundle_trust import minimize as minimize
-    from fenics_contact._page.page import result_page as result_page
+    from fenics_contact._page.entry import result_page as result_page
     from fenics_contact._responses import DesignResponse as DesignResponse
     from fenics_contact._responses import SceneResponse as SceneResponse
     from fenics_contact._scene.automatic import AutomaticContact as AutomaticContact
@@ -131,7 +131,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.surface_laws import FrictionTable as FrictionTable
     from fenics_contact._scene.surface_laws import LinearClosure as LinearClosure
     from fenics_contact._scene.surface_laws import SlipTable as SlipTable
-    from fenics_contact._scene_file.reading import read_scene_file as read_scene_file
+    from fenics_contact._scene_file.entry import read_scene_file as read_scene_file
     from fenics_contact.design.design import SurfaceDesign as SurfaceDesign
     from fenics_contact.design.problem import ShapeProblem as ShapeProblem
     from fenics_contact.mesh.body_mesh import BodyMesh as BodyMesh

@@ -17,7 +17,8 @@ from fenics_contact._base.display import counted
 from fenics_contact._base.progress import is_visible, show_progress
 from fenics_contact._cli.console import Console, console_of, facts, write_stderr
 from fenics_contact._scene.plan import Plan
-from fenics_contact._scene_file.reading import SceneFile, read_scene_file
+from fenics_contact._scene_file.entry import read_scene_file
+from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
 
 Command: TypeAlias = Callable[..., None]

@@ -176,7 +176,7 @@ def view(
 
 
 def _write_page(console: Console, result: Path, target: Path) -> None:
-    from fenics_contact._page.page import result_page
+    from fenics_contact._page.entry import result_page
 
     result_page(result, target)
     console.write(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")

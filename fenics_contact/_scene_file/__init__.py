@@ -5,12 +5,18 @@
 what was given.
 """
 
+from typing import TYPE_CHECKING
+
+from fenics_contact._base.late_names import late_names
 from fenics_contact._scene_file import _libraries  # noqa: F401
-from fenics_contact._scene_file.document import Document, UnitNames
-from fenics_contact._scene_file.reading import SceneFile, ShapeTask, read_scene_file
-from fenics_contact._scene_file.source import Mistake, SceneFileError, Source, suggestion
-from fenics_contact._scene_file.validation import json_schema
-from fenics_contact._scene_file.values import Expression, VectorExpression
+
+if TYPE_CHECKING:
+    from fenics_contact._scene_file.document import Document, UnitNames
+    from fenics_contact._scene_file.entry import read_scene_file
+    from fenics_contact._scene_file.reading import SceneFile, ShapeTask
+    from fenics_contact._scene_file.source import Mistake, SceneFileError, Source, suggestion
+    from fenics_contact._scene_file.validation import json_schema
+    from fenics_contact._scene_file.values import Expression, VectorExpression
 
 __all__ = [
     "Document",
@@ -26,3 +32,5 @@ __all__ = [
     "read_scene_file",
     "suggestion",
 ]
+
+__getattr__, __dir__ = late_names(__name__)

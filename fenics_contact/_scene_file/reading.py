@@ -17,7 +17,7 @@ from fenics_contact._adaptive.minimised import AccurateDesign, minimize_to
 from fenics_contact._adaptive.nested import check_nested, solve_nested
 from fenics_contact._adaptive.quantities import quantity
 from fenics_contact._base.checkpoint import Checkpoint
-from fenics_contact._base.checks import naming_arguments, require_file
+from fenics_contact._base.checks import require_file
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import LoadSequence
 from fenics_contact._optimize.bundle_trust import BundleTrust, minimize
@@ -36,7 +36,7 @@ from fenics_contact._scene_file.design import (
     design_surface,
     fitting,
 )
-from fenics_contact._scene_file.document import Document, load_steps, refused_python
+from fenics_contact._scene_file.document import Document, load_steps
 from fenics_contact._scene_file.source import (
     Mistake,
     SceneFileError,
@@ -48,7 +48,7 @@ from fenics_contact._scene_file.source import (
     written,
 )
 from fenics_contact._scene_file.source import Path as Keys
-from fenics_contact._scene_file.validation import surface_parts, unknown, validated, wrong_names
+from fenics_contact._scene_file.validation import surface_parts, unknown
 from fenics_contact._scene_file.values import OfFile, at_time, is_reference
 from fenics_contact.design.design import SurfaceDesign
 from fenics_contact.design.memory import AdaptiveTolerance
@@ -536,57 +536,21 @@ class SceneFile:
         return located(self.source, keys)
 
 
-@naming_arguments
-def read_scene_file(
-    scene: str | Path | Mapping[str, Any],
-    comm: MPI.Comm,
-    *,
-    overrides: Sequence[str] = (),
-    python: bool = True,
-) -> SceneFile:
-    """Read and check a scene file, or a dictionary of the same form. Collective on ``comm``.
-
-    Rank 0 reads, all ranks receive the text and raise the same mistakes.
-
-    Args:
-        scene: A TOML file, or a dictionary of its content.
-        comm: Communicator on which meshes will be built and states computed.
-        overrides: Other values for some keys, ``"contacts.0.friction.coefficient=0.2"``.
-        python: Whether the file may name Python code ("file.py:Name"), which is run when the scene is built.
-            Use False for an untrusted file.
-
-    Returns:
-        The file, checked as far as possible without building meshes.
-
-    Raises:
-        SceneFileError: Naming all mistakes, each with line, key, what is allowed and what was given.
-
-    Example:
-        >>> file = read_scene_file("two_blocks.toml", MPI.COMM_WORLD)  # doctest: +SKIP
-        >>> state = file.solve()  # doctest: +SKIP
-    """
-    source = _source(scene, comm).with_overrides(overrides)
-    document = validated(source)
-    wrong = wrong_names(source, document) or ([] if python else refused_python(source, document))
-    if wrong:
-        raise SceneFileError(source.name, wrong)
-    return SceneFile(source, document, comm)
-
-
 @singledispatch
-def _source(scene: object, comm: MPI.Comm) -> Source:
+def source_of(scene: object, comm: MPI.Comm) -> Source:
+    """Return the content of a file, or of a dictionary. Collective on ``comm``."""
     raise InvalidInputError(
         f"a scene must be the path of a TOML file or a dictionary, got {type(scene).__name__}"
     )
 
 
-@_source.register(Mapping)
+@source_of.register(Mapping)
 def _(scene: Mapping[str, Any], comm: MPI.Comm) -> Source:
     return Source("the scene", Path(), scene)
 
 
-@_source.register(str)
-@_source.register(Path)
+@source_of.register(str)
+@source_of.register(Path)
 def _(scene: str | Path, comm: MPI.Comm) -> Source:
     path = Path(scene)
     return parse(on_root_then_bcast(comm, lambda: _text_of(path)), path.name, path.parent)

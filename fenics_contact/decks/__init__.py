@@ -1,8 +1,15 @@
 """Decks of CalculiX and Abaqus, read as scenes with their load steps."""
 
-from fenics_contact.decks.convert import write_scene_file
-from fenics_contact.decks.deck import Deck, read_deck
-from fenics_contact.decks.tables import Print, PrintTable
-from fenics_contact.readers.deck_cards import DeckError, Origin
+from typing import TYPE_CHECKING
+
+from fenics_contact._base.late_names import late_names
+
+if TYPE_CHECKING:
+    from fenics_contact.decks.convert import write_scene_file
+    from fenics_contact.decks.deck import Deck, read_deck
+    from fenics_contact.decks.tables import Print, PrintTable
+    from fenics_contact.readers.deck_cards import DeckError, Origin
 
 __all__ = ["Deck", "DeckError", "Origin", "Print", "PrintTable", "read_deck", "write_scene_file"]
+
+__getattr__, __dir__ = late_names(__name__)

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from fenics_contact._base import form_language  # noqa: F401 (imports UFL at less cost)
 from fenics_contact._base.late_names import late_names
 
 if TYPE_CHECKING:
