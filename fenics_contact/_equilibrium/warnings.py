@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 from typing import TYPE_CHECKING
@@ -16,8 +16,8 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._equilibrium.between_nodes import between_nodes, more_press_than_a_facet_has
 from fenics_contact._equilibrium.corners_inside import corner_between_nodes
 from fenics_contact._equilibrium.peaks import coarse_peak, unmatched_nodes
+from fenics_contact._equilibrium.turning import Turning
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
-from fenics_contact._scene.body import Body
 from fenics_contact._scene.local_axes import TILT
 from fenics_contact._scene.pair_geometry import Outline, bodies_near, outline_of, unpaired
 from fenics_contact._scene.pairs import ContactPair, Surface
@@ -84,6 +84,7 @@ class ContactWarnings:
         self._values: set[str] = set()
         self._points: ContactPoints | None = None
         self._finer = np.zeros(0)
+        # Of each body the mesh of its last state, and a bound on rotations by displacements of length one.
         self._rotations = dict[str, tuple[BodyMesh, float]]()
         self._outlines: dict[str, tuple[BodyMesh, Outline]] = {}
 
@@ -191,33 +192,22 @@ class ContactWarnings:
         moved = state.torn_displacement.reshape(-1, state.torn.components)
         longest = float(comm.allreduce(np.linalg.norm(moved, axis=1).max(initial=0.0), op=MPI.MAX))
         for name, body in state.scene.deforming.items():
-            if body.deforms_much or name in self._given or longest * self._bound(state, name, body) <= FAR:
+            mesh, bound = self._rotations.get(name, (None, np.inf))
+            small = mesh is body.mesh and longest * bound <= FAR
+            if body.deforms_much or name in self._given or small:
                 continue
-            angle = rotation_of(comm, _moved_cells(state, name, body.mesh))
-            if angle > FAR:
+            turned = Turning.of(state, name)
+            self._rotations[name] = body.mesh, turned.bound
+            if turned.rotation > FAR:
                 words = (
-                    f"body {name!r} has turned by {angle:.2g} rad; its material is for small rotations, "
-                    f"{angle**2 / 2:.1g} of strain is due to this alone: "
+                    f"body {name!r} has turned by {turned.rotation:.2g} rad; its material is for small "
+                    f"rotations, {turned.rotation**2 / 2:.1g} of strain is due to this alone: "
                     f"{'take it in space and ' * body.torsion}give it a material for large "
                     "deformations, such as StVenantKirchhoff"
                 )
                 self._log(state, name, words)
-            strain = strain_of(comm, _moved_cells(state, name, body.mesh))
-            if strain > STRAINED:
-                self._log(state, (name, "strain"), _words_of_strain(name, strain))
-
-    def _bound(self, state: State, name: str, body: Body) -> float:
-        """Bound rotations by displacements of length one, [1/length]; once for a mesh. Collective."""
-        mesh = body.mesh
-        if name not in self._rotations or self._rotations[name][0] is not mesh:
-            largest, turned = 0.0, 0.0
-            for gradients, _ in _moved_cells(state, name, mesh):
-                largest = max(largest, gradients.largest)
-                turned = max(turned, 1.0 / gradients.radius.min() if body.torsion else 0.0)
-            comm = state.torn.decomposition.comm
-            both = [comm.allreduce(part, op=MPI.MAX) for part in (largest, turned)]
-            self._rotations[name] = mesh, sum(both)
-        return self._rotations[name][1]
+            if turned.strain > STRAINED:
+                self._log(state, (name, "strain"), _words_of_strain(name, turned.strain))
 
     def _passing_bodies(self, state: State) -> list[FacetsOutside]:
         """Warn of bodies with facets in one another, or that touch without a pair or tie. Collective.
@@ -271,77 +261,6 @@ class DeferredWarnings(ContactWarnings):
 
     def _write(self, log: Callable[..., None], words: str) -> None:
         self._deferred.append((log, words))
-
-
-@dataclass(frozen=True)
-class _Gradients:
-    """How gradients of cells follow from the displacements of their corners, by least squares.
-
-    `inverse`: gradient by the displacement of each corner, [1 / length]; `size`: volumes up to a factor.
-    """
-
-    corners: np.ndarray
-    inverse: np.ndarray
-    size: np.ndarray
-    radius: np.ndarray
-
-    @classmethod
-    def of(cls, points: np.ndarray, corners: np.ndarray) -> _Gradients:
-        arms = points[corners]
-        radius = arms[..., 0].mean(axis=1)
-        arms = arms - arms.mean(axis=1, keepdims=True)
-        metric = np.einsum("nkd,nke->nde", arms, arms)
-        return cls(corners, arms @ np.linalg.inv(metric), np.sqrt(np.linalg.det(metric)), radius)
-
-    @property
-    def largest(self) -> float:
-        """A bound on the rotation of any cell by displacements of length one, [1 / length]."""
-        return float(np.linalg.norm(self.inverse, axis=2).sum(axis=1).max())
-
-    def rotation(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the sum of the squares of the rotations of cells, weighted by size, and that of sizes."""
-        gradient = self._gradient(displacement)
-        square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
-        return np.array([square @ self.size, self.size.sum()])
-
-    def strain(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the same of the strains of cells, those around an axis left out."""
-        gradient = self._gradient(displacement)
-        square = ((gradient + gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 4.0
-        return np.array([square @ self.size, self.size.sum()])
-
-    def _gradient(self, displacement: np.ndarray) -> np.ndarray:
-        gradient = np.einsum("nkd,nke->nde", self.inverse, displacement[self.corners])
-        if gradient.shape[1] < gradient.shape[2]:  # with torsion
-            turn = displacement[self.corners].mean(axis=1) / self.radius[:, None]
-            around = np.stack([-turn[:, 2], np.zeros(len(turn)), turn[:, 0]], axis=1)
-            gradient = np.concatenate([gradient, around[:, None]], axis=1)
-        return gradient
-
-
-def _moved_cells(state: State, name: str, mesh: BodyMesh) -> Iterator[tuple[_Gradients, np.ndarray]]:
-    """Return for each of this rank's subdomains of a body its gradients and displacements of its nodes."""
-    decomposition, linear = state.torn.decomposition, mesh.linear.cells
-    parents = mesh.cells_cut
-    for own, part in zip(decomposition.meshes, decomposition.parts, strict=True):
-        if own.body == name:
-            order = np.argsort(own.nodes)
-            nodes = own.nodes[order]
-            cells = np.searchsorted(nodes, linear[np.isin(parents, own.cells)])
-            gradients = _Gradients.of(mesh.points[nodes], cells)
-            yield gradients, state.torn_displacement[part].reshape(len(nodes), -1)[order]
-
-
-def rotation_of(comm: MPI.Comm, parts: Iterable[tuple[_Gradients, np.ndarray]]) -> float:
-    """Return by how much the cells of a body turn, as a root mean square, in radians. Collective."""
-    sums = comm.allreduce(sum((gradients.rotation(moved) for gradients, moved in parts), np.zeros(2)))
-    return float(np.sqrt(sums[0] / sums[1]))
-
-
-def strain_of(comm: MPI.Comm, parts: Iterable[tuple[_Gradients, np.ndarray]]) -> float:
-    """Return by how much the cells of a body are strained, likewise. Collective."""
-    sums = comm.allreduce(sum((gradients.strain(moved) for gradients, moved in parts), np.zeros(2)))
-    return float(np.sqrt(sums[0] / sums[1]))
 
 
 def _words_of_strain(name: str, strain: float) -> str:

@@ -29,7 +29,6 @@ from fenics_contact import (
     box_partition,
     solve_scene,
 )
-from fenics_contact._equilibrium.warnings import _Gradients, rotation_of
 from fenics_contact._pairing.advice import ADVICE
 from fenics_contact._pairing.search import find_tied_points
 from fenics_contact._scene.pair_geometry import master_share
@@ -417,14 +416,3 @@ def test_a_linear_body_alone_is_told_of_once(caplog: pytest.LogCaptureFixture) -
         (words,) = [record.getMessage() for record in caplog.records]
         assert words.startswith("body 'beam' has turned by ")
         assert words.endswith("give it a material for large deformations, such as StVenantKirchhoff")
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_the_rotation_of_a_body_is_that_of_its_rigid_motion(dim: int) -> None:
-    mesh = rectangle((100, 0), (101, 2), (3, 2)) if dim == 2 else block((100, 0, 0), (101, 2, 3), (2, 2, 1))
-    spin = np.zeros((3, 3))
-    spin[0, 1], spin[2, 0], spin[1, 2] = (0.03, 0.0, 0.0) if dim == 2 else (0.03, 0.1, -0.2)
-    moved = mesh.points @ (spin - spin.T)[:dim, :dim] + 5.0
-    gradients = _Gradients.of(mesh.points, mesh.cells)
-    assert rotation_of(MPI.COMM_SELF, [(gradients, moved)]) == pytest.approx(np.linalg.norm(spin), rel=1e-10)
-    assert rotation_of(MPI.COMM_SELF, [(gradients, 0.1 * mesh.points)]) == pytest.approx(0.0, abs=1e-12)
