@@ -385,7 +385,7 @@ TOUCHING = 1e-3
 #: Part of a facet by which they overlap before loads more than facets do.
 OVERLAPPING = 0.05
 
-#: The boundary of a body, in linear facets, with the cell behind each, and its inside, in simplices.
+#: The boundary of a body, in linear facets, with the cell behind each, and all its linear cells.
 Outline: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -434,7 +434,7 @@ def outline_of(mesh: BodyMesh) -> Outline:
     """Return the boundary and the inside of a body, which depend on its cells alone."""
     cells = mesh.linear.cells
     facets, behind = boundary_faces(cells, mesh.dim, mesh.hanging)
-    return facets, cells[behind], simplices_in(cells, mesh.dim)
+    return facets, cells[behind], cells
 
 
 def unpaired_bodies(scene: SceneParts) -> tuple[str, ...]:
@@ -493,17 +493,53 @@ def unpaired(
         facets, behind, _ = outlines[body]
         by_name = np.all(np.isin(facets, named[body]), axis=1)
         own, mine = (facets[by_name], behind[by_name]), np.flatnonzero(~by_name)[share]
-        facets, behind, inside = facets[mine], behind[mine], outlines[into][2]
-        size = np.ptp(before[facets], axis=1).max(axis=1)
-        here, there = _Facets.of(before, facets, behind), _Facets.of(before + moved[body], facets, behind)
-        passed = wall + moved[into]
-        touching = here.within(TOUCHING * size, wall, inside)
-        overlapping = here.within(-OVERLAPPING * size, wall, inside)
-        overlapping &= ~here.follow(_Facets.of(before, *own), overlapping, wall, inside)
-        entered = there.within(-deep, passed, inside) & ~here.within(-deep, wall, inside)
-        entered &= ~there.follow(_Facets.of(before + moved[body], *own), entered, passed, inside)
+        after, passed, cells = before + moved[body], wall + moved[into], outlines[into][2]
+        near, met = _near(before[facets[mine]], deep, wall, cells)
+        for each in zip((near, met), _near(after[facets[mine]], deep, passed, cells), strict=True):
+            np.logical_or(*each, out=each[0])
+        if not near.any():
+            continue
+        facets, behind = facets[mine[near]], behind[mine[near]]
+        inside, size = simplices_in(cells[met], scene.dim), np.ptp(before[facets], axis=1).max(axis=1)
+        here, there = _Facets.of(before, facets, behind), _Facets.of(after, facets, behind)
+        out = np.stack([TOUCHING * size, -OVERLAPPING * size, np.full(len(size), -deep)])
+        touching, overlapping, began = here.within(out, wall, inside)
+        overlapping &= ~here.follow(_Facets.of(before, *own), overlapping, wall, cells)
+        entered = there.within(out[2:], passed, inside)[0] & ~began
+        entered &= ~there.follow(_Facets.of(after, *own), entered, passed, cells)
         counts += [np.count_nonzero(each) for each in (touching, overlapping, entered)]
     return Unpaired(both, any(len(nodes) for nodes in named.values()), tuple(counts.tolist()))
+
+
+def _near(
+    facets: np.ndarray, deep: float, points: np.ndarray, cells: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return marks of the facets that may lie in cells or touch them, and of these cells; no others do.
+
+    `facets`: their corners, shape (n, corners, dim), [length]; `deep`: how far below them their middles are
+    looked for, [length]. Boxes around cells decide.
+    """
+    middle, size = facets.mean(axis=1), np.ptp(facets, axis=1).max(axis=1, initial=0.0)
+    slack = deep + 2.0 * OVERLAPPING * size  # more than they need, which covers rounding
+    near, met = np.zeros(len(facets), dtype=bool), np.zeros(len(cells), dtype=bool)
+    meet = (middle >= points.min(axis=0) - slack[:, None]) & (middle <= points.max(axis=0) + slack[:, None])
+    first = np.flatnonzero(meet.all(axis=1))
+    if not len(first):
+        return near, met
+    middle, slack = middle[first], slack[first]
+    low, high = (middle - slack[:, None]).min(axis=0), (middle + slack[:, None]).max(axis=0)
+    beyond = np.packbits(np.concatenate([points < low, points > high], axis=1), axis=1)[:, 0]
+    other = np.flatnonzero(np.bitwise_and.reduce(beyond[cells.T], axis=0) == 0)
+    corners = points[cells[other]]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    reach = 0.5 * np.linalg.norm(high - low, axis=1) + slack.max()
+    close = cKDTree(middle).query_ball_point(0.5 * (low + high), reach)
+    cell = np.repeat(np.arange(len(other)), [len(each) for each in close])
+    facet = np.concatenate([*close, np.zeros(0)]).astype(np.int64)
+    far = np.maximum(low[cell] - middle[facet], middle[facet] - high[cell]).max(axis=1) > slack[facet]
+    near[first[facet[~far]]] = True
+    met[other[cell[~far]]] = True
+    return near, met
 
 
 def _moved_by_supports(scene: SceneParts, name: str) -> np.ndarray:
@@ -557,17 +593,18 @@ class _Facets:
         inner = points[cells].mean(axis=1)
         return cls(middle, normal, np.einsum("nd,nd->n", middle - inner, normal))
 
-    def within(self, out: np.ndarray | float, wall: np.ndarray, simplices: np.ndarray) -> np.ndarray:
-        """Return which middles, moved outwards, are inside a body; inwards only as far as their cells go."""
-        places = self.middle + np.maximum(out, -self.depth)[:, None] * self.normal
-        found: np.ndarray = ((places >= wall.min(axis=0)) & (places <= wall.max(axis=0))).all(axis=1)
+    def within(self, out: np.ndarray, wall: np.ndarray, simplices: np.ndarray) -> np.ndarray:
+        """Return which middles, moved outwards, are inside a body; inwards only as far as their cells go.
+
+        `out`: how far, several times, shape (m, n), [length]; returns shape (m, n).
+        """
+        places = self.middle + np.maximum(out, -self.depth)[..., None] * self.normal
+        found: np.ndarray = ((places >= wall.min(axis=0)) & (places <= wall.max(axis=0))).all(axis=2)
         if found.any():
             found[found] = _in_simplices(places[found], wall, simplices)
         return found
 
-    def follow(
-        self, leading: _Facets, chosen: np.ndarray, wall: np.ndarray, simplices: np.ndarray
-    ) -> np.ndarray:
+    def follow(self, leading: _Facets, chosen: np.ndarray, wall: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Return which of the chosen facets are behind leading ones that go as deep into a body as they do.
 
         Their neighbours in the same surface lead themselves.
@@ -579,6 +616,7 @@ class _Facets:
             middle, normal = leading.middle[near], leading.normal[near]
             behind = np.maximum(np.einsum("nd,nd->n", middle - self.middle[at], normal), 0.0)
             found[at] = np.einsum("nd,nd->n", self.normal[at], normal) < 0.5
+            simplices = simplices_in(cells, wall.shape[1])
             found[at] &= _in_simplices(middle - behind[:, None] * normal, wall, simplices)
         return found
 
