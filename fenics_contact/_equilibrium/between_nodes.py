@@ -16,6 +16,7 @@ from fenics_contact._pairing.inside import (
     InFacets,
     InsideOf,
     PointsInside,
+    Sampled,
     deepest_points,
     points_inside,
 )
@@ -82,25 +83,30 @@ class Missed:
 def between_nodes(state: State, number: int, moved: float = 0.0) -> Missed | None:
     """Return what a pair misses between its nodes by more than a share of what moves. Collective.
 
-    None where it misses nothing, and where its gaps are given. It is looked for once in a state.
+    None where it misses nothing, and where its gaps are given. It is looked for once in a state, and deepest
+    points only where samples show that it may be more than a share of what is known to move.
     """
-    if number not in state.missed:
-        state.missed[number] = _missed(state, number)
-    missed = cast("Missed | None", state.missed[number])
+    pressing = _pressing_points(state, number)
+    found, below = state.missed.get(number, (None, np.inf))
+    if (least := least_depth(moved, pressing)) < below:
+        found, below = state.missed[number] = _missed(state, number, least)
+    missed = cast("Missed | None", found)
     if missed is None:
         return None
     missed = replace(missed, moved=max(missed.moved, moved))
-    least = least_depth(missed.moved, _pressing_points(state, number))
-    return missed if missed.deepest.missed.max() > least else None
+    return missed if missed.deepest.missed.max() > least_depth(missed.moved, pressing) else None
 
 
-def _missed(state: State, number: int) -> Missed | None:
-    """Return where facets of a pair lie deeper than their nodes, None where none does. Collective."""
+def _missed(state: State, number: int, least: float) -> tuple[Missed | None, float]:
+    """Return where facets of a pair lie deeper than their nodes, None where none does. Collective.
+
+    And 0, or the least depth where samples show that no facet lies so much deeper.
+    """
     scene, comm = state.scene, state.torn.decomposition.comm
     pair = scene.contacts[number]
     if not can_miss(pair):
-        return None
-    found: Missed | None = None
+        return None, 0.0
+    found: tuple[Missed | None, float] = None, 0.0
     with together(comm):
         undeformed = InsideOf.of(scene, pair)
         inside = where_they_are(state, undeformed, number)
@@ -111,7 +117,9 @@ def _missed(state: State, number: int) -> Missed | None:
     displaced = _displaced(state, inside, facets)
     with together(comm):
         if comm.rank == 0 and len(facets):
-            found = _deepest(inside, undeformed, number, facets, displaced)
+            sampled, found = Sampled.of(inside.slave.corners, facets, _gaps(inside, displaced)), (None, least)
+            if len(sampled.may_miss(least)):
+                found = _deepest(inside, undeformed, number, sampled, displaced), 0.0
     return comm.bcast(found)
 
 
@@ -154,11 +162,11 @@ def displaced_at(state: State, nodes: np.ndarray) -> np.ndarray:
 
 
 def _deepest(
-    inside: InsideOf, undeformed: InsideOf, number: int, facets: np.ndarray, displaced: np.ndarray
+    inside: InsideOf, undeformed: InsideOf, number: int, sampled: Sampled, displaced: np.ndarray
 ) -> Missed | None:
     gaps_at = _gaps(inside, displaced)
     rounding = LAST_PLACES * float(np.abs(inside.slave.points).max())
-    deepest = deepest_points(inside.slave.corners, facets, gaps_at, rounding)
+    deepest = deepest_points(inside.slave.corners, sampled, gaps_at, rounding)
     if not len(deepest.facet):
         return None
     points = inside.at(deepest.facet, deepest.local)

@@ -77,30 +77,59 @@ class Deepest:
         return Deepest(self.facet[chosen], self.local[chosen], self.gap[chosen], self.at_nodes[chosen])
 
 
-def deepest_points(corners: int, facet: np.ndarray, gaps_at: GapsAt, least: float = 0.0) -> Deepest:
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Gaps at samples of some facets, of which those at corners are no part.
+
+    Attributes:
+        facet: Numbers of the facets, ascending, shape (n,).
+        gap: Shape (n, m), [length].
+        varies: By how much gaps vary in each facet, corners included, shape (n,), [length].
+        at_nodes: The smallest gap at the corners of each facet, shape (n,), [length].
+    """
+
+    facet: np.ndarray
+    gap: np.ndarray
+    varies: np.ndarray
+    at_nodes: np.ndarray
+
+    @classmethod
+    def of(cls, corners: int, facet: np.ndarray, gaps_at: GapsAt) -> Sampled:
+        """Return those of facets with so many corners; `gaps_at`: gaps at their points."""
+        found, at_ends = (
+            _on_all(gaps_at, facet, places) for places in (_samples(corners), corner_places(corners))
+        )
+        every = np.concatenate([found, at_ends], axis=1)
+        finite = np.where(np.isfinite(every), every, np.nan)
+        highest, lowest = (of(finite, axis=1, initial=0.0) for of in (np.nanmax, np.nanmin))
+        return cls(facet, found, np.nan_to_num(highest - lowest), at_ends.min(axis=1, initial=np.inf))
+
+    def may_miss(self, least: float) -> np.ndarray:
+        """Return which facets may lie deeper than their corners by more than a depth, shape (k,).
+
+        Between samples the gap is lower by no more than a small part of how much it varies.
+        """
+        lowest = self.gap.min(axis=1, initial=np.inf)
+        return np.flatnonzero(lowest < np.minimum(self.at_nodes, 0.0) - least + 0.1 * self.varies)
+
+
+def deepest_points(corners: int, sampled: Sampled, gaps_at: GapsAt, least: float = 0.0) -> Deepest:
     """Return the deepest points of those facets that miss more than a depth.
 
-    `corners`: of a facet; `facet`: the facets, ascending, shape (n,); `gaps_at`: gaps at their points;
-    `least`: the depth, [length].
+    `corners`: of a facet; `sampled`: the facets; `gaps_at`: gaps at their points; `least`: the depth,
+    [length].
     """
-    samples, ends = _samples(corners), corner_places(corners)
-    found, at_ends = (_on_all(gaps_at, facet, places) for places in (samples, ends))
-    every = np.concatenate([found, at_ends], axis=1)
-    finite = np.where(np.isfinite(every), every, np.nan)
+    near, samples = sampled.may_miss(least), _samples(corners)
+    facet, found, varies = sampled.facet[near], sampled.gap[near], sampled.varies[near]
     lowest = found.min(axis=1, initial=np.inf)
-    varies = np.nan_to_num(np.nanmax(finite, axis=1, initial=0.0) - np.nanmin(finite, axis=1, initial=0.0))
-    at_nodes = at_ends.min(axis=1, initial=np.inf)
-    # Between samples the gap is lower by no more than a small part of how much it varies.
-    near = np.flatnonzero(lowest < np.minimum(at_nodes, 0.0) - least + 0.1 * varies)
-    facet, lowest, varies, at_nodes = facet[near], lowest[near], varies[near], at_nodes[near]
-    flat = (found[near] <= (lowest + FLAT * varies)[:, None]).astype(float)
+    flat = (found <= (lowest + FLAT * varies)[:, None]).astype(float)
     middle = flat @ samples / flat.sum(axis=1, keepdims=True)
-    alone = samples[np.argmin(found[near], axis=1)]
+    alone = samples[np.argmin(found, axis=1)]
     in_middle = gaps_at(facet, middle)
     local = np.where((in_middle <= lowest + FLAT * varies)[:, None], middle, alone)
     gap = np.minimum(in_middle, np.where(in_middle <= lowest + FLAT * varies, in_middle, lowest))
     local, gap = _descended(corners, facet, gaps_at, local, gap, 1e-3 * FLAT * varies)
-    result = Deepest(facet, local, gap, at_nodes)
+    result = Deepest(facet, local, gap, sampled.at_nodes[near])
     return result.part(result.missed > least)
 
 

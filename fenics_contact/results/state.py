@@ -229,7 +229,7 @@ class State(ABC):
     tolerance: Tolerance = None
     known_errors: StateErrors | None = field(default=None, repr=False)
     peak_uncertainties: tuple[PeakUncertainty, ...] = field(default=(), repr=False)
-    missed: dict[int, object] = field(default_factory=dict, repr=False)
+    missed: dict[int, tuple[object, float]] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
         """List what was found and what it cost, without communication: any rank may print alone."""

@@ -11,9 +11,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import ContactProblem, Coulomb, RigidSphere, RigidTool, Support, solve_scene, solve_to
+from fenics_contact import (
+    ContactProblem,
+    Coulomb,
+    RigidSphere,
+    RigidTool,
+    Scene,
+    Support,
+    solve_scene,
+    solve_to,
+)
+from fenics_contact._equilibrium import between_nodes as searched
+from fenics_contact._equilibrium.between_nodes import ALONE, SHARE, between_nodes
 from fenics_contact._equilibrium.steps import stored_state
-from fenics_contact._pairing.inside import InFacets
+from fenics_contact._pairing.inside import InFacets, deepest_points
 from fenics_contact._pairing.sliding.contact import SlidingContact
 from fenics_contact.materials import J2Plasticity, PlaneStrain
 from fenics_contact.results.linear_state import LinearState
@@ -44,6 +55,32 @@ def test_contact_between_nodes_is_named_with_its_depth_and_what_to_do(
     assert "its force, not only its largest pressure, may be off by a half or more" in words
     assert CALL in words
     assert f"peak pressure    {doubt}" in str(state)
+
+
+@pytest.mark.parametrize(
+    "scene", [pressed_on_disc(0.5), pressed_on_disc(0.2), pressed_on_ball((0.4, 0.3), 0.4)]
+)
+def test_where_samples_show_that_little_is_missed_nobody_looks_further(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And nothing is overlooked, also where what moves makes it just as much as counts, or just less."""
+    whole = replace(solve_scene(scene, MPI.COMM_SELF, tolerance=1e-8), missed={})
+    missed = between_nodes(whole, 0)
+    assert missed is not None
+    depth, looked = float(missed.deepest.missed.max()), []
+    monkeypatch.setattr(searched, "deepest_points", lambda *of: looked.append(of) or deepest_points(*of))
+    found = []
+    for share in (0.01, 0.5, 0.99, 1.01, 2.0, 100.0):
+        moved = depth / share / (SHARE if whole.contact.normal_force.any() else ALONE)
+        fresh, here = replace(whole, missed={}), len(looked)
+        both = between_nodes(fresh, 0, moved), between_nodes(whole, 0, moved)
+        doubts = [each and each.doubt("here") for each in both]
+        assert doubts[0] == doubts[1]
+        found.append((bool(doubts[0]), len(looked) > here))
+        assert (again := between_nodes(fresh, 0)) is not None
+        assert again.doubt("here") == missed.doubt("here")
+    assert found[0] == (False, False)
+    assert found[-1][1]
 
 
 def test_fine_meshes_touch_at_nodes(caplog: pytest.LogCaptureFixture) -> None:

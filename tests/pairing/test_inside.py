@@ -16,7 +16,15 @@ from fenics_contact import (
     Support,
     Surface,
 )
-from fenics_contact._pairing.inside import Deepest, GapsAt, InFacets, InsideOf, deepest_points, points_inside
+from fenics_contact._pairing.inside import (
+    Deepest,
+    GapsAt,
+    InFacets,
+    InsideOf,
+    Sampled,
+    deepest_points,
+    points_inside,
+)
 from fenics_contact._pairing.masters import turning
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._pairing.search import find_contact_points
@@ -31,7 +39,7 @@ RNG = np.random.default_rng(4)
 
 
 def found(corners: int, gap: GapsAt, count: int = 1) -> Deepest:
-    return deepest_points(corners, np.arange(count), gap)
+    return deepest_points(corners, Sampled.of(corners, np.arange(count), gap), gap)
 
 
 @pytest.mark.parametrize(
