@@ -91,9 +91,10 @@ def prefers_explicit(size: int, interface: int, *, products: int = PRODUCTS, rat
     return explicit < implicit
 
 
-def expected_seconds(size: int, interface: int) -> float:
+def expected_cost(size: int, interface: int) -> LocalCost:
     """Return the cost of a subdomain stored in the cheaper way; arguments as for `prefers_explicit`."""
-    return min(_totals(size, interface, PRODUCTS, MEASURED))
+    cost = explicit_cost if prefers_explicit(size, interface) else implicit_cost
+    return cost(size, interface)
 
 
 def factor_bytes(size: int, dim: int) -> float:

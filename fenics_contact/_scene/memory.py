@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.memory import addressable_memory, available_memory
 from fenics_contact._base.sparse import factor_bytes, prefers_explicit
 from fenics_contact._scene.checks import check_positive
+from fenics_contact._scene.dealing import Dealing
 from fenics_contact.errors import InvalidInputError, together
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class Subdomains:
         kind: Numbers of kinds: those that seem alike up to rotations and mirrors have the same.
         matrix: The same of those that seem alike up to translations, wherever rows of B touch them.
         couplings: Entries of a row of the stiffness, about.
-        place: Place of each among those of its body, in (0, 1).
+        body: Number of its body.
     """
 
     size: np.ndarray
@@ -75,13 +76,13 @@ class Subdomains:
     kind: np.ndarray
     matrix: np.ndarray
     couplings: np.ndarray
-    place: np.ndarray
+    body: np.ndarray
 
     @classmethod
     def of(cls, scene: SceneParts, partitions: Mapping[str, np.ndarray]) -> Subdomains:
         """Return those of the bodies that have a partition of their cells."""
         materials = [body.material for body in scene.bodies.values()]
-        sizes, shapes, turned, place = [], [], [], []
+        sizes, shapes, turned, bodies = [], [], [], list[np.ndarray]()
         for (name, body), material in zip(scene.bodies.items(), materials, strict=True):
             if name not in partitions:
                 continue
@@ -91,22 +92,27 @@ class Subdomains:
             sizes.append(np.column_stack([counts, own, couplings]))
             shapes.append(invariants)
             turned.append(moments)
-            place.append((np.arange(len(counts)) + 0.5) / len(counts))
+            bodies.append(np.full(len(counts), len(bodies)))
         counts = np.concatenate(sizes)
         size, interface = counts[:, :2].astype(np.int64).T
         numbers = (
             _numbered(counts, np.concatenate(shapes)),
             _numbered(counts[:, [0, 2, 3, -2]], np.concatenate(turned)),
         )
-        return cls(size, interface, *numbers, counts[:, -1], np.concatenate(place))
+        return cls(size, interface, *numbers, counts[:, -1], np.concatenate(bodies))
 
-    def of_rank(self, rank: int, ranks: int) -> np.ndarray:
-        """Return those that a rank gets when they are dealt out."""
-        return np.flatnonzero((self.place * ranks).astype(int) == rank)
+    def dealt(self, ranks: int) -> np.ndarray:
+        """Return the rank that each is dealt to."""
+        return Dealing.of(self.body, self.kind, self.size, self.interface).among(ranks)
 
     def kinds(self, ranks: int = 1) -> int:
         """Return how many kinds the ranks have, each of its own."""
-        return sum(len(np.unique(self.kind[self.of_rank(rank, ranks)])) for rank in range(ranks))
+        return len(np.unique(np.column_stack([self.dealt(ranks), self.kind]), axis=0))
+
+    @property
+    def unlike(self) -> Subdomains:
+        """The same where none shares factors with another."""
+        return replace(self, kind=np.arange(len(self.kind)))
 
 
 def _numbered(counts: np.ndarray, shapes: np.ndarray) -> np.ndarray:
@@ -139,8 +145,9 @@ def expected_memory(
     meshes = sum(body.mesh.points.nbytes + body.mesh.cells.nbytes for body in scene.bodies.values())
     steady = ranks * (rates.start + meshes + rates.tables * torn) + rates.own * torn
     factors = workspaces = assembled = 0.0
+    dealt = parts.dealt(ranks)
     for rank in range(ranks):
-        mine = parts.of_rank(rank, ranks)
+        mine = np.flatnonzero(dealt == rank)
         held, during = _factors(parts, mine, scene.dim, rates, compact)
         factors, workspaces = factors + held, workspaces + during
         first = mine[np.unique(parts.matrix[mine], return_index=True)[1]]

@@ -14,11 +14,11 @@ from fenics_contact import _dolfinx
 from fenics_contact._base.costs import count_messages, count_of_exchange, with_ledger
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, PETSc, free_communicators, start
-from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent
+from fenics_contact._base.sparse import LAST_PLACES, dispose_with, sent
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, joined_axes, same_axes
-from fenics_contact._scene.memory import require_memory
+from fenics_contact._scene.memory import Subdomains, require_memory
 from fenics_contact._scene.revolution import hold_axis
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.tools import with_tool_parts
@@ -84,9 +84,12 @@ class Tearing(NodeNumbers):
 
 
 def tear(
-    scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, stiffness: Mapping[str, np.ndarray]
+    scene: Scene, partitions: Mapping[str, np.ndarray], rank: np.ndarray, stiffness: Mapping[str, np.ndarray]
 ) -> Tearing:
-    """Cut the bodies along a partition of their cells and distribute the subdomains over ranks."""
+    """Cut the bodies along a partition of their cells.
+
+    `rank`: the one that gets each subdomain, body after body.
+    """
     numbers = NodeNumbers.of(scene)
     names, node_offset = numbers.body_names, numbers.node_offset
     counts = [int(partitions[name].max()) + 1 for name in names]
@@ -109,47 +112,16 @@ def tear(
     order = np.argsort(key)
     key, stiff = key[order], stiff[order]
     multiplicity = np.bincount(key // total, minlength=int(node_offset[-1]))
-    costs = _costs(key % total, multiplicity[key // total] > 1, total, scene.components)
     return Tearing(
         names,
         node_offset,
         scene.components,
         subdomain_offset,
-        _deal_out(np.split(costs, subdomain_offset[1:-1]), ranks),
+        rank,
         np.concatenate([[0], np.cumsum(multiplicity)]),
         key % total,
         stiff / stiff.max(),
     )
-
-
-def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int, components: int) -> np.ndarray:
-    """Return the estimated cost of each subdomain, shape (n_subdomains,), [s]."""
-    size = components * np.bincount(copy_subdomain, minlength=count)
-    interface = components * np.bincount(copy_subdomain[shared], minlength=count)
-    return np.array([expected_seconds(int(n), int(b)) for n, b in zip(size, interface, strict=True)])
-
-
-def _deal_out(costs: list[np.ndarray], ranks: int) -> np.ndarray:
-    """Return the rank of every subdomain, given the costs body by body.
-
-    Each body is spread over all ranks as far as possible: where one body changes its shape or has all the
-    contacts, no rank waits for another.
-    """
-    place = np.concatenate([(np.cumsum(cost) - 0.5 * cost) / cost.sum() for cost in costs])
-    order = np.argsort(place, kind="stable")
-    owner = np.empty(len(place), dtype=np.int64)
-    owner[order] = _spread_over_ranks(np.concatenate(costs)[order], ranks)
-    return owner
-
-
-def _spread_over_ranks(cost: np.ndarray, ranks: int) -> np.ndarray:
-    """Distribute consecutive items over ranks so that the costs are about equal and no rank is empty."""
-    middle = np.cumsum(cost) - 0.5 * cost
-    owner = np.minimum((middle * ranks / cost.sum()).astype(int), ranks - 1)
-    # Every rank has at least one: no rank is skipped, and enough items remain for the last ones.
-    index = np.arange(len(cost))
-    without_jumps = np.minimum.accumulate(np.minimum(owner, index) - index) + index
-    return np.maximum(without_jumps, ranks - (len(cost) - index))
 
 
 @dataclass(frozen=True)
@@ -470,11 +442,12 @@ def decompose(
     forms.prepare(scene)
     # Ranks agree on errors after each local stage, before the next collective one.
     with together(comm):
-        tearing = tear(scene, partitions, comm.size, cell_stiffness(scene, forms))
-        if tearing.n_subdomains < comm.size:
+        rank = _dealt(scene, partitions, comm.size)
+        if len(rank) < comm.size:
             raise InvalidInputError(
-                f"{comm.size} ranks need as many subdomains, got {tearing.n_subdomains}: use scene.partition"
+                f"{comm.size} ranks need as many subdomains, got {len(rank)}: use scene.partition"
             )
+        tearing = tear(scene, partitions, rank, cell_stiffness(scene, forms))
         here = np.flatnonzero(tearing.subdomain_rank == comm.rank)
         _check_communicators(len(here), each=20 if scene.is_nonlinear else 14)
     with together(comm):
@@ -505,6 +478,15 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
             given = partition.shape if isinstance(partition, np.ndarray) else repr(partition)
             raise InvalidInputError(f"partitions[{name!r}] needs shape ({body.mesh.n_cells},), got {given}")
         check_face_connected(body.mesh, pieces(body.mesh, partition))
+
+
+def _dealt(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int) -> np.ndarray:
+    """Return the rank of each subdomain, body after body."""
+    if ranks == 1:
+        return np.zeros(sum(int(part.max()) + 1 for part in partitions.values()), dtype=np.int64)
+    parts = Subdomains.of(scene, partitions)
+    # Tangents differ wherever bodies are deformed: nothing is alike.
+    return (parts.unlike if scene.is_nonlinear else parts).dealt(ranks)
 
 
 def _check_communicators(subdomains: int, each: int) -> None:

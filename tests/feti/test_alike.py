@@ -327,14 +327,17 @@ ON_RANKS = """
 """
 
 
-def test_each_rank_shares_among_its_own_with_the_same_answer(mpirun: Callable[..., str]) -> None:
-    words = mpirun(ON_RANKS, 2).split()
-    kinds, forces = [int(word) for word in words[:2]], np.array(words[2:], dtype=float)
+@pytest.mark.parametrize("ranks", [2, 4])
+def test_two_ranks_have_as_many_kinds_as_one_and_all_have_the_same_answer(
+    ranks: int, mpirun: Callable[..., str]
+) -> None:
+    words = mpirun(ON_RANKS, ranks).split()
+    kinds, forces = [int(word) for word in words[:ranks]], np.array(words[ranks:], dtype=float)
     scene, cut = sliding_block()
     alone = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-11))
     expected = alone.contact.force[np.argsort(alone.contact.points.slave)].ravel()
     np.testing.assert_allclose(forces, expected, atol=1e-10 * np.abs(expected).max())
-    assert max(kinds) <= alone.counts["kinds"]
+    assert alone.counts["kinds"] == sum(kinds) if ranks == 2 else sum(kinds) <= 9
 
 
 def test_a_moved_subdomain_is_factored_alone_or_joins_a_kind() -> None:

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import given
-from hypothesis import strategies as st
 from mpi4py import MPI
 
 from fenics_contact import Body, Scene, Support, box_partition
@@ -18,7 +16,6 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DualSystem, Rows, TornSystem, build_torn_system, decompose
 from fenics_contact.feti.decomposition import (
     Tearing,
-    _spread_over_ranks,
     gluing_rows,
     prescribed_displacements,
     tear,
@@ -38,8 +35,9 @@ def torn(cut: Cut, contrast: float = 0.0) -> Tearing:
     scene, partitions = cut
     rng = np.random.default_rng(5)
     cells = {name: body.mesh.n_cells for name, body in scene.bodies.items()}
+    alone = np.zeros(sum(part.max() + 1 for part in partitions.values()), dtype=int)
     return tear(
-        scene, partitions, 1, {n: 10.0 ** (contrast * rng.random(count)) for n, count in cells.items()}
+        scene, partitions, alone, {n: 10.0 ** (contrast * rng.random(count)) for n, count in cells.items()}
     )
 
 
@@ -180,34 +178,11 @@ def test_supports_of_one_body_leave_the_nodes_of_others_alone() -> None:
     assert fixed[mesh.n_nodes :].all(axis=1).sum() == 9
 
 
-# Subdomains are dealt out to ranks evenly, in order, and none goes without.
-COSTS = st.lists(st.integers(1, 10**6), min_size=1, max_size=60)
-
-
-@given(COSTS, st.data())
-def test_no_rank_is_empty_and_runs_are_consecutive(costs: list[int], data: st.DataObject) -> None:
-    ranks = data.draw(st.integers(1, len(costs)))
-    owner = _spread_over_ranks(np.array(costs), ranks)
-    assert set(owner) == set(range(ranks))
-    assert (np.diff(owner) >= 0).all()
-
-
-@pytest.mark.parametrize(("items", "ranks"), [(8, 1), (8, 2), (8, 8), (12, 4), (32, 4)])
-def test_equal_costs_are_shared_equally(items: int, ranks: int) -> None:
-    owner = _spread_over_ranks(np.full(items, 480), ranks)
-    assert (np.bincount(owner) == items // ranks).all()
-
-
-def test_one_heavy_subdomain_does_not_take_a_neighbour_along() -> None:
-    owner = _spread_over_ranks(np.array([1000, 10, 10, 10]), 2)
-    assert owner.tolist() == [0, 1, 1, 1]
-
-
 def test_nodes_and_subdomains_of_all_bodies_are_numbered_through() -> None:
     scene, partitions = touching_blocks()
     forms = FormLibrary(MPI.COMM_SELF)
     forms.prepare(scene)
-    tearing = tear(scene, partitions, 3, cell_stiffness(scene, forms))
+    tearing = tear(scene, partitions, np.arange(9) % 3, cell_stiffness(scene, forms))
     assert tearing.body_names == ("lower", "upper", "third")
     assert tearing.subdomain_offset.tolist() == [0, 4, 7, 9]
     assert tearing.n_subdomains == 9
