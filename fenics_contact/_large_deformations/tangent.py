@@ -14,6 +14,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from fenics_contact._base.libraries import MPI, PETSc
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact.errors import ConvergenceError
+from fenics_contact.feti.by_shape import BY_MATRIX
 from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.dual import DirichletPreconditioner, DualSystem
 from fenics_contact.feti.factor import (
@@ -470,7 +471,7 @@ def linearised(
         subdomains.append(
             replace(
                 subdomain, points=points, kernel=kernel, resisted=kernel[:, :0], resistance=np.zeros(0),
-                load=unbalanced[part], matrix=matrix,
+                load=unbalanced[part], matrix=matrix, shape=BY_MATRIX,
             )
         )  # fmt: skip
         start = part.stop

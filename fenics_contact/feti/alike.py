@@ -5,13 +5,14 @@ or a mirror Q, a translation and the numbering π of nodes, K_first = P K Pᵀ w
 times Q in each; then K_first⁺ = P K⁺ Pᵀ, and S likewise where P maps the interfaces on each other.
 
 Invariants choose candidates, coordinates suggest Q and π, and the matrices themselves decide: whatever enters
-the stiffness, such as material axes, springs or hanging nodes, must agree to rounding.
+the stiffness, such as material axes, springs or hanging nodes, must agree to rounding. Where it depends on
+the shape alone cells decide, and samples of matrices confirm it, see `by_shape`.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -35,23 +36,21 @@ class Kind:
         self.subdomain, self.interface = subdomain, interface
         self.width = subdomain.mesh.components
         modes, (count, dim) = subdomain.kernel.shape[1], subdomain.points.shape
-        self.key = count, dim, self.width, modes, len(interface)
+        self.key = count, dim, self.width, modes, len(interface), subdomain.shape.key
         self.operator: LocalOperator | None = None
 
-    @cached_property
-    def diagonal(self) -> np.ndarray:
-        """Diagonal of the stiffness, (n,)."""
-        return np.asarray(self.subdomain.stiffness.diagonal())
+    def stiffness(self) -> sp.csr_matrix:
+        """Return the stiffness, assembled where it was not."""
+        return self.subdomain.stiffness
 
     @cached_property
     def size(self) -> np.ndarray:
-        """Invariants under rigid motions and numbering: trace and norm of the stiffness."""
-        values = self.subdomain.stiffness.data
-        return np.array([self.diagonal.sum(), np.sqrt(values @ values)])
+        """Two invariants under rigid motions and numbering."""
+        return self.subdomain.shape.invariants(self.arms, self.stiffness)
 
     def forget(self) -> None:
         """Free what is made again where it is needed."""
-        for name in ("arms", "tree", "marks", "sorted_marks", "blocks", "diagonal"):
+        for name in ("arms", "tree", "marks", "sorted_marks", "blocks"):
             self.__dict__.pop(name, None)
 
     @cached_property
@@ -73,10 +72,10 @@ class Kind:
 
     @cached_property
     def marks(self) -> np.ndarray:
-        """Invariants of each node in one number, (n,): distance, stiffness, dofs on the interface."""
+        """Invariants of each node in one number, (n,): distance, stiffness or cells, interface."""
         counts = np.bincount(self.interface // self.width, minlength=len(self.arms))
-        stiff = self.diagonal.reshape(-1, self.width).sum(axis=1) / np.abs(self.diagonal).mean()
-        return np.asarray(np.linalg.norm(self.arms, axis=1) / self.reach + np.pi * stiff + 10.0 * counts)
+        own = self.subdomain.shape.marks(self.stiffness, self.width)
+        return np.asarray(np.linalg.norm(self.arms, axis=1) / self.reach + np.pi * own + 10.0 * counts)
 
     @cached_property
     def sorted_marks(self) -> np.ndarray:
@@ -130,7 +129,7 @@ class Kinds:
         self._agreement = agreement or Agreement()
         self.all: list[Kind] = []
         # By counts and trace: kind, a subdomain of it with a numbering of its own, how it lies on the first.
-        self._seen: dict[tuple[int, ...], ToleranceIndex[tuple[Kind, Kind, Placement]]] = defaultdict(
+        self._seen: dict[tuple[Hashable, ...], ToleranceIndex[tuple[Kind, Kind, Placement]]] = defaultdict(
             ToleranceIndex
         )
         self._matrices: set[int] = set()
@@ -151,7 +150,7 @@ class Kinds:
 
         One that is like none before is a new kind.
         """
-        seen, room = self._seen[given.key], self._agreement.matrix * len(given.diagonal) * given.size
+        seen, room = self._seen[given.key], self._agreement.matrix * given.arms.size * given.size
         near = seen.near(given.size[0], room[0])
         near = [each for each in near if abs(each[1].size[1] - given.size[1]) <= room[1]]
         for kind, other, motion in near:
@@ -174,11 +173,20 @@ class Kinds:
 
     def _same_numbers(self, one: Kind, other: Kind) -> bool:
         """Return whether two subdomains are the same dof by dof."""
-        if not np.array_equal(one.interface, other.interface) or not self._agree(
-            one.diagonal, other.diagonal
-        ):
+        if not np.array_equal(one.interface, other.interface):
             return False
-        A, B = one.subdomain.stiffness, other.subdomain.stiffness
+        if one.subdomain.matrix is other.subdomain.matrix:
+            return True
+        apart = np.abs(one.arms - other.arms).max() / one.reach
+        if apart > self._agreement.shape:
+            return False
+        nodes = np.arange(len(one.arms))
+        return one.subdomain.shape.agrees(
+            other.subdomain.shape, nodes, apart, 0.0, lambda: self._same_entries(one, other)
+        )
+
+    def _same_entries(self, one: Kind, other: Kind) -> bool:
+        A, B = one.stiffness(), other.stiffness()
         same = np.array_equal(A.indptr, B.indptr) and np.array_equal(A.indices, B.indices)
         return same and self._agree(A.data, B.data)
 
@@ -199,9 +207,17 @@ class Kinds:
             if given.width == len(Q):
                 Q = _nearest_orthogonal(first.arms.T @ given.arms[nodes])
             motion = Motion.of(nodes, Q, given.width)
-            if motion.maps(given.interface, first.interface) and self._same_matrix(first, given, nodes, Q):
+            if motion.maps(given.interface, first.interface) and self._same(first, given, nodes, Q):
                 return motion
         return None
+
+    def _same(self, first: Kind, given: Kind, nodes: np.ndarray, Q: np.ndarray) -> bool:
+        """Return whether P K Pᵀ is the stiffness of the first one, by shapes or by matrices."""
+        apart = np.abs(first.arms - given.arms[nodes] @ Q.T).max() / first.reach
+        sign = float(np.sign(np.linalg.det(Q)))
+        return first.subdomain.shape.agrees(
+            given.subdomain.shape, nodes, apart, sign, lambda: self._same_matrix(first, given, nodes, Q)
+        )
 
     def _turns(self, first: Kind, given: Kind) -> Iterator[np.ndarray]:
         """Yield orthogonal Q with x_first = Q x about the centroids that reference nodes suggest."""

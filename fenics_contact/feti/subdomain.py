@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from hashlib import blake2b
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,11 +28,12 @@ from fenics_contact._scene.loads import (
     initial_stress,
 )
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.by_shape import BY_MATRIX, ByMatrix, ByShape, Families
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.following import AnyFollowing, Following
 from fenics_contact.feti.foundations import by_resistance, foundation_stiffness
 from fenics_contact.feti.nearby import ToleranceIndex
-from fenics_contact.materials.elastic import Material
+from fenics_contact.materials.elastic import Material, is_isotropic
 from fenics_contact.mesh.collapsed import expanded
 from fenics_contact.mesh.faces import coordinate_rounding, corners_of, match_faces
 
@@ -110,6 +112,14 @@ class SubdomainMesh:
     facets: dict[str, tuple[np.ndarray, np.ndarray]]
     following: AnyFollowing
 
+    #: Whether the cells are those of the body.
+    has_own_cells: ClassVar[bool] = True
+
+    def blocks_of_cells(self, cells: np.ndarray) -> np.ndarray:
+        """Return the blocks at the nodes of each of the cells, given those of the body, (n_cells, k)."""
+        order = np.argsort(self.nodes)
+        return np.asarray(order[np.searchsorted(self.nodes, cells[self.cells], sorter=order)])
+
     def by_input_node(self, values: np.ndarray) -> np.ndarray:
         """Return values by input node of the dolfinx mesh of those by block, (n_blocks, ...)."""
         return values[np.argsort(self.nodes)]
@@ -165,6 +175,8 @@ class MixedMesh(SubdomainMesh):
     `on_dofs`: values of dolfinx's dofs by those of the subdomain's, shape (n, components · n_blocks).
     """
 
+    has_own_cells = False
+
     on_input: sp.csr_matrix
     on_dofs: sp.csr_matrix
 
@@ -209,7 +221,7 @@ class Subdomain:
     Those that differ only in their loads share one `matrix`. `load`: f_s; `kernel`: R_s: zero-energy modes as
     columns; `typical_stiffness`: mean diagonal entry of K_s without foundations; `resisted`: motions that
     foundations or springs of a tool alone resist, as columns, shape (dim n, r); `resistance`: RᵀK R of each
-    of these, shape (r,).
+    of these, shape (r,); `shape`: what the stiffness is compared by.
     """
 
     mesh: SubdomainMesh
@@ -224,6 +236,7 @@ class Subdomain:
     resisted: np.ndarray
     resistance: np.ndarray
     springs: tuple[float, ...] = ()
+    shape: ByMatrix = BY_MATRIX
 
     @property
     def stiffness(self) -> sp.csr_matrix:
@@ -235,9 +248,9 @@ class CachedMatrix:
     """A matrix that can be rebuilt, so that it need not be stored while unused."""
 
     def __init__(self, make: Callable[[], sp.csr_matrix]) -> None:
-        """Build it for the first time."""
+        """Build it when it is first needed."""
         self._make = make
-        self._matrix: sp.csr_matrix | None = make()
+        self._matrix: sp.csr_matrix | None = None
 
     def get(self) -> sp.csr_matrix:
         """Return the matrix, rebuilt if necessary, and store it."""
@@ -265,6 +278,10 @@ class Alone:
         """Return none."""
         return None
 
+    def shape(self, mesh: SubdomainMesh, body: Body, parts: Composition, points: np.ndarray) -> ByMatrix:
+        """Return what the stiffness of a subdomain at points is compared by."""
+        return BY_MATRIX
+
 
 ALONE = Alone()
 
@@ -276,9 +293,11 @@ class Assembled(Alone):
         """Start empty."""
         # By space: subdomains with cells connected and numbered alike share one.
         self._known: dict[int, ToleranceIndex[Subdomain]] = defaultdict(ToleranceIndex)
+        self._families = Families()
 
     def add(self, subdomain: Subdomain) -> None:
         """Add a subdomain whose matrix depends on cells, numbering, materials and shape alone."""
+        self._families.add(subdomain.shape.family)
         shape = _from_own_origin(subdomain.points)
         self._known[id(subdomain.mesh.space)].add(float(np.abs(shape).sum()), subdomain)
 
@@ -295,6 +314,14 @@ class Assembled(Alone):
             if apart <= rounding and other.material.same_as(parts) and follow_alike:
                 return other
         return None
+
+    def shape(self, mesh: SubdomainMesh, body: Body, parts: Composition, points: np.ndarray) -> ByMatrix:
+        """Return the shape where the material has no directions and no node follows others."""
+        plain = len(parts.materials) == 1 and is_isotropic(parts.materials[0]) and mesh.has_own_cells
+        if not plain or mesh.following.apart.shape[0] or mesh.components != points.shape[1]:
+            return BY_MATRIX
+        cells = partial(mesh.blocks_of_cells, body.mesh.cells)
+        return ByShape(self._families.of((body.element, parts.materials), points, cells()), cells)
 
 
 def cut_out(
@@ -451,10 +478,12 @@ def _with_stiffness(
     assembled: Alone,
 ) -> Subdomain:
     """Return the subdomain without loads."""
+    kernel = kernel_of_body(body, points, parts.materials).reshape(mesh.size, -1)
+    nothing = np.zeros(mesh.size)
     twin = assembled.same_as(mesh, parts, points)
     if twin is not None:
-        kernel = kernel_of_body(body, points, parts.materials).reshape(mesh.size, -1)
-        return replace(twin, mesh=mesh, loads=(), points=points, load=np.zeros(mesh.size), kernel=kernel)
+        return replace(twin, mesh=mesh, loads=(), points=points, load=nothing, kernel=kernel)
+    shape = assembled.shape(mesh, body, parts, points)
     space, element = mesh.space, body.element
     by_input_node = mesh.by_input_node(points)
     if not _varies(parts, body, forms):
@@ -469,17 +498,19 @@ def _with_stiffness(
 
     bed = foundation_of(mesh, body, foundations)
     matrix = CachedMatrix(stiffness)
-    K = matrix.get()
-    _check_finite(K.data, mesh)
-    modes = [kernel_of_body(body, points, parts.materials), body.sprung_modes(points)]
-    kernel = np.concatenate(modes, axis=-1).reshape(mesh.size, -1)
-    kernel, resisted, resistance = by_resistance(body.sprung(bed, points), kernel)
-    check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
-    typical = float((K.diagonal() - bed.diagonal()).mean())
-    nothing = np.zeros(mesh.size)
+    modes = np.concatenate([kernel, body.sprung_modes(points).reshape(mesh.size, -1)], axis=1)
+    kernel, resisted, resistance = by_resistance(body.sprung(bed, points), modes)
+
+    def typical() -> float:
+        K = matrix.get()
+        _check_finite(K.data, mesh)
+        check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
+        return float((K.diagonal() - bed.diagonal()).mean())
+
     found = Subdomain(
-        mesh, parts, foundations, (), points, nothing, kernel, typical, matrix, resisted, resistance, springs
-    )
+        mesh, parts, foundations, (), points, nothing, kernel, shape.typical_stiffness(typical), matrix,
+        resisted, resistance, springs, shape,
+    )  # fmt: skip
     assembled.add(found)
     return found
 
@@ -488,7 +519,7 @@ def _depends_on_shape_alone(
     body: Body, parts: Composition, forms: FormLibrary, beds: Sequence[ElasticFoundation]
 ) -> bool:
     """Return whether the stiffness depends on cells, numbering, materials and shape, but not on the place."""
-    special = bool(beds) or body.is_rigid
+    special = bool(beds) or body.is_rigid or bool(body.springs)
     return body.kinematics.is_homogeneous and not (special or _varies(parts, body, forms))
 
 

@@ -49,6 +49,11 @@ def isotropic_constants(material: object) -> tuple[float, float] | None:
     return (float(young), float(poisson)) if young is not None and poisson is not None else None
 
 
+def is_isotropic(material: object) -> bool:
+    """Return whether a material is one of the isotropic ones here; models derived from these may not be."""
+    return type(material) in (IsotropicElasticity, PlaneStrain, PlaneStress)
+
+
 def lame(young_modulus: float, poisson_ratio: float) -> tuple[float, float]:
     """Return the first Lamé parameter λ and the shear modulus G, [force / length²]."""
     E, nu = young_modulus, poisson_ratio

@@ -26,6 +26,7 @@ from fenics_contact import (
 )
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.alike import Kind, Kinds
+from fenics_contact.feti.by_shape import BY_MATRIX, ByMatrix, ByShape, Family, Samples
 from fenics_contact.feti.compact import CompactOperator
 from fenics_contact.feti.inverse import (
     ExplicitOperator,
@@ -40,6 +41,7 @@ from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
     Elasticity,
     IsotropicElasticity,
+    Material,
     OrthotropicElasticity,
     PlaneStrain,
     strain,
@@ -132,8 +134,18 @@ def moved(mesh: BodyMesh, Q: np.ndarray) -> BodyMesh:
     return mesh.moved(mesh.points @ Q.T + np.array([3.0, -2.0, 0.7]))
 
 
+class OwnElasticity(IsotropicElasticity):
+    """A user's material, whose stiffness may have directions as far as anybody knows."""
+
+
+@pytest.mark.parametrize(
+    # Those of the first, and of the first turned one, with which others agree dof by dof; compared by shapes
+    # that of the first, then the sample, and no others.
+    ("steel", "expected"),
+    [(OwnElasticity(210.0, 0.3), [0, 1, 1, 2, 2]), (STEEL, [0, 1, 1, 2, 2])],
+)
 def test_matrices_are_held_no_longer_than_others_are_compared_with_them(
-    monkeypatch: pytest.MonkeyPatch,
+    steel: Material, expected: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     placed, held, place = list[Kind](), list[int](), Kinds.place
 
@@ -146,10 +158,9 @@ def test_matrices_are_held_no_longer_than_others_are_compared_with_them(
     monkeypatch.setattr(Assembled, "same_as", lambda *given: None)  # each has a matrix of its own
     mesh = bent()
     meshes = [mesh, moved(mesh, np.eye(3)), moved(mesh, TURN), moved(mesh, TURN), renumbered(mesh)]
-    inverse = of_bodies([Body(each, STEEL) for each in meshes], ["x0"] * 5, LocalKind.EXPLICIT)
+    inverse = of_bodies([Body(each, steel) for each in meshes], ["x0"] * 5, LocalKind.EXPLICIT)
     assert (len(inverse.kinds), inverse.factored) == (1, 1)
-    # Those of the first, and of the first turned one, with which others agree dof by dof.
-    assert held == [0, 1, 1, 2, 2]
+    assert held == expected
     assert not any("blocks" in vars(each) for each in placed)
 
 
@@ -260,19 +271,22 @@ def _longer(body: Body) -> Body:
 
 
 def _stiffer(body: Body) -> Body:
-    return replace(body, material=IsotropicElasticity(210.0 * (1 + 1e-6), 0.3))
+    kind: Any = type(body.material)
+    return replace(body, material=kind(210.0 * (1 + 1e-6), 0.3))
 
 
 def _contracting(body: Body) -> Body:
-    return replace(body, material=IsotropicElasticity(210.0, 0.3 + 1e-6))
+    kind: Any = type(body.material)
+    return replace(body, material=kind(210.0, 0.3 + 1e-6))
 
 
 @pytest.mark.parametrize("changed", [_a_node_aside, _longer, _stiffer, _contracting])
 @pytest.mark.parametrize("Q", [np.eye(3), QUARTER, TURN], ids=["shifted", "quarter", "turned"])
+@pytest.mark.parametrize("steel", [STEEL, OwnElasticity(210.0, 0.3)], ids=["known", "own"])
 def test_what_is_alike_but_for_a_millionth_is_not_shared(
-    Q: np.ndarray, changed: Callable[[Body], Body]
+    steel: Material, Q: np.ndarray, changed: Callable[[Body], Body]
 ) -> None:
-    body = Body(bent(), STEEL)
+    body = Body(bent(), steel)
     other = replace(changed(body), mesh=moved(changed(body).mesh, Q))
     inverse = of_bodies([body, other], ["x0"] * 2, LocalKind.EXPLICIT)
     assert len(inverse.kinds) == 2
@@ -338,6 +352,98 @@ def test_two_ranks_have_as_many_kinds_as_one_and_all_have_the_same_answer(
     expected = alone.contact.force[np.argsort(alone.contact.points.slave)].ravel()
     np.testing.assert_allclose(forces, expected, atol=1e-10 * np.abs(expected).max())
     assert alone.counts["kinds"] == sum(kinds) if ranks == 2 else sum(kinds) <= 9
+
+
+def counted(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str) -> list[object]:
+    """Count the calls of a method, by what they return."""
+    whole, results = getattr(owner, name), list[object]()
+
+    def method(self: Any, *given: Any) -> Any:
+        results.append(whole(self, *given))
+        return results[-1]
+
+    monkeypatch.setattr(owner, name, method)
+    return results
+
+
+def mirrored(mesh: BodyMesh) -> BodyMesh:
+    """The mesh behind a mirror, with hexahedra of positive volume."""
+    cells = mesh.cells[:, [1, 0, 3, 2, 5, 4, 7, 6]]
+    surfaces = {name: facets[:, ::-1] for name, facets in mesh.surfaces.items()}
+    return BodyMesh(mesh.points * [-1.0, 1.0, 1.0], cells, surfaces)
+
+
+def many_of_one_shape() -> list[BodyMesh]:
+    turns = [Rotation.from_euler("xyz", [k, 0.3 - k, 2.0 * k]).as_matrix() for k in range(4)]
+    return [moved(each, Q) for each in (bent(), renumbered(bent()), mirrored(bent())) for Q in turns]
+
+
+def test_what_depends_on_the_shape_alone_is_compared_before_it_is_assembled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    compared = counted(monkeypatch, Kinds, "_same_matrix")
+    bodies = [Body(each, STEEL) for each in many_of_one_shape()]
+    inverse = of_bodies(bodies, ["x0"] * len(bodies), LocalKind.EXPLICIT)
+    assert (len(inverse.kinds), compared) == (1, [True, True])  # one sample turned, one mirrored
+    require_operators_of_each(inverse)
+    assert len(compared) == 2
+    compared.clear()
+    bodies = [replace(body, material=OwnElasticity(210.0, 0.3)) for body in bodies]
+    assert len(of_bodies(bodies, ["x0"] * len(bodies), LocalKind.EXPLICIT).kinds) == 1
+    assert len(compared) == len(bodies) - 1
+
+
+def test_samples_that_differ_have_all_matrices_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fenics_contact.feti.subdomain.is_isotropic", lambda material: True)
+    compared = counted(monkeypatch, Kinds, "_same_matrix")
+    bodies = [Body(each, wood(np.eye(3))) for each in many_of_one_shape()]
+    bodies += bodies[:2]
+    inverse = of_bodies(bodies, ["x0"] * len(bodies), LocalKind.EXPLICIT)
+    assert compared.count(False) > len(bodies)
+    assert len(inverse.kinds) == 4 + 4  # renumbered ones are alike
+    require_operators_of_each(inverse)
+
+
+@pytest.mark.parametrize(
+    ("aside", "kinds", "compared"),
+    # The sample alone; matrices, which agree; matrices, which do not.
+    [(1e-15, 1, [True]), (3e-13, 1, [True, True]), (1e-10, 2, [True, False])],
+)
+def test_matrices_decide_where_nodes_are_elsewhere_by_more_than_rounding(
+    aside: float, kinds: int, compared: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Assembled, "same_as", lambda *given: None)  # each has a matrix of its own
+    mesh = renumbered(bent())
+    points = mesh.points.copy()
+    points[np.argmax(points.sum(axis=1)), 0] += aside
+    near = BodyMesh(points, mesh.cells, mesh.surfaces)
+    found = counted(monkeypatch, Kinds, "_same_entries")
+    bodies = [Body(moved(each, TURN), STEEL) for each in (bent(), mesh, mesh, near)]
+    inverse = of_bodies(bodies, ["x0"] * 4, LocalKind.EXPLICIT)
+    assert (len(inverse.kinds), found[: len(compared)]) == (kinds, compared)
+    require_operators_of_each(inverse)
+
+
+def test_shapes_agree_if_cells_do_and_samples_did() -> None:
+    family, nodes, same = Family((), np.zeros(1), Samples()), np.array([3, 2, 1, 0, 4]), [True, False]
+    cells = np.array([[0, 1, 2, 4], [0, 2, 3, 4]])
+    shape, turned, other = (
+        ByShape(family, each.copy) for each in (cells, nodes[cells[::-1, [2, 0, 1, 3]]], cells[[0, 0]])
+    )
+
+    def compare() -> bool:
+        return same.pop(0)
+
+    assert shape.agrees(turned, nodes, 0.0, 1.0, compare)
+    assert shape.agrees(turned, nodes, 0.0, 1.0, compare)
+    assert same == [False], "the second time nothing is compared"
+    assert not shape.agrees(other, nodes, 0.0, 1.0, compare)
+    same += [False] * 4
+    assert not shape.agrees(turned, nodes, 1e-12, 1.0, compare)
+    assert not shape.agrees(ByShape(Family((), np.zeros(1), Samples()), cells.copy), nodes, 0.0, 1.0, compare)
+    assert not shape.agrees(turned, nodes, 0.0, -1.0, compare), "a mirror needs a sample of its own"
+    assert not shape.agrees(turned, nodes, 0.0, 1.0, compare), "one that differs ends the trust"
+    assert not same
 
 
 def test_a_moved_subdomain_is_factored_alone_or_joins_a_kind() -> None:
@@ -442,6 +548,10 @@ class _Stiff:
     @property
     def matrix(self) -> csr_matrix:
         return self.stiffness
+
+    @property
+    def shape(self) -> ByMatrix:
+        return BY_MATRIX
 
     @property
     def components(self) -> int:

@@ -328,6 +328,20 @@ MUTATIONS = (
         ("tests/feti/test_alike.py::test_what_is_alike_but_for_a_millionth_is_not_shared",),
     ),
     Mutation(
+        "cells decide without samples of matrices",
+        "feti/by_shape.py",
+        "if sort <= self.passed and family not in self.failed:",
+        "if sort:",
+        ("tests/feti/test_alike.py::test_samples_that_differ_have_all_matrices_compared",),
+    ),
+    Mutation(
+        "subdomains share factors whatever their cells are",
+        "feti/by_shape.py",
+        "if not np.array_equal(_ordered(nodes[self.cells()]), _ordered(other.cells())):",
+        "if False:",
+        ("tests/feti/test_alike.py::test_shapes_agree_if_cells_do_and_samples_did",),
+    ),
+    Mutation(
         "what a mirrored subdomain returns keeps the signs of the first one",
         "feti/moved.py",
         "vector[self.place] = self.sign * moved",
