@@ -14,6 +14,7 @@ from fenics_contact import _dolfinx
 from fenics_contact._base.costs import count_messages, count_of_exchange, with_ledger
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, PETSc, free_communicators, start
+from fenics_contact._base.shared import once_a_machine
 from fenics_contact._base.sparse import LAST_PLACES, dispose_with, sent
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
@@ -28,6 +29,7 @@ from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import pieces
+from fenics_contact.mesh.held_once import hold_once_a_machine
 from fenics_contact.mesh.partition import check_face_connected, kept_together
 
 
@@ -36,7 +38,7 @@ from fenics_contact.mesh.partition import check_face_connected, kept_together
 class Tearing(NodeNumbers):
     """The subdomains of the bodies of a scene, and the rank that owns each.
 
-    Replicated on all ranks. Subdomains, like nodes, are numbered consecutively, body after body. A *copy* is
+    Held once a machine. Subdomains, like nodes, are numbered consecutively, body after body. A *copy* is
     a pair (node, subdomain); copies are sorted by node, then by subdomain. `first_copy`: first copy of each
     node and the total; `copy_stiffness`: typical stiffness at each copy, the largest being one.
     """
@@ -57,6 +59,11 @@ class Tearing(NodeNumbers):
     def copy_node(self) -> np.ndarray:
         """Node of each copy, shape (n_copies,)."""
         return np.repeat(np.arange(self.n_nodes), self.multiplicity)
+
+    def copies_in(self, nodes: np.ndarray, subdomain: int) -> np.ndarray:
+        """Return the copy of each of some nodes in a subdomain that has them all."""
+        _, copies = self.copies_of(nodes)
+        return copies[self.copy_subdomain[copies] == subdomain]
 
     def copies_of(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return for each copy of each of some nodes the place of that node among them, and the copy."""
@@ -217,6 +224,36 @@ def weighted_helmert(stiffness: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class GluingNumbers:
+    """The numbers of gluing rows, held once a machine.
+
+    `start`: first row of each component of each node, and the total, shape (n_nodes · dim + 1,); `dof`: node
+    and component that each row belongs to, as node · dim + component; `owner`: rank that owns each row;
+    `right`: zeros; `fixed`: marks of prescribed components, shape (n_nodes, dim).
+    """
+
+    start: np.ndarray
+    dof: np.ndarray
+    owner: np.ndarray
+    right: np.ndarray
+    fixed: np.ndarray
+
+    @classmethod
+    def of(cls, tearing: Tearing, fixed: np.ndarray, dependent: np.ndarray) -> GluingNumbers:
+        """Number the rows, see `gluing_rows`."""
+        counts = tearing.multiplicity
+        counts[dependent] = 1
+        counts = np.where(fixed, counts[:, None], counts[:, None] - 1).ravel()
+        start = np.concatenate([[0], np.cumsum(counts)])
+        dof = np.repeat(np.arange(fixed.size), counts)
+        # A gluing row belongs to the rank of its node's first copy, a prescribing row to that of its copy.
+        within = np.where(fixed.ravel()[dof], np.arange(len(dof)) - start[dof], 0)
+        anchor = tearing.first_copy[dof // tearing.components] + within
+        owner = tearing.subdomain_rank[tearing.copy_subdomain[anchor]]
+        return cls(start, dof, owner, np.zeros(len(dof)), fixed)
+
+
+@dataclass(frozen=True)
 class GluingRows:
     """The equality rows that glue torn bodies together and fix them at their supports.
 
@@ -258,13 +295,20 @@ def gluing_rows(
     `dependent`: numbers of nodes that hang or are centres, none of which is; `rank`: the one whose copies the
     entries are on; None: all entries.
     """
+    dependent = np.asarray(dependent, dtype=np.int64)
+    return rows_of(tearing, GluingNumbers.of(tearing, fixed, dependent), axes, dependent, rank)
+
+
+def rows_of(
+    tearing: Tearing, numbers: GluingNumbers, axes: LocalAxes, dependent: np.ndarray, rank: int | None
+) -> GluingRows:
+    """Return gluing rows with these numbers, see `gluing_rows`."""
     here = np.full(len(tearing.copy_subdomain), rank is None)
     here |= tearing.subdomain_rank[tearing.copy_subdomain] == rank
     touched = np.logical_or.reduceat(here, tearing.first_copy[:-1])[:, None]
-    multiplicity = tearing.multiplicity.copy()
-    multiplicity[np.asarray(dependent, dtype=np.int64)] = 1
-    counts = np.where(fixed, multiplicity[:, None], multiplicity[:, None] - 1)
-    start = np.concatenate([[0], np.cumsum(counts.ravel())])
+    multiplicity = tearing.multiplicity
+    multiplicity[dependent] = 1
+    fixed, start = numbers.fixed, numbers.start
     parts = [_prescribed_entries(tearing, fixed & touched, start)]
     for copies in np.unique(multiplicity[multiplicity > 1]):
         glued = touched & ~fixed & (multiplicity == copies)[:, None]
@@ -273,14 +317,8 @@ def gluing_rows(
     if axes:
         row, copy, component, entry = _turned_entries(tearing, axes, row, copy, component, entry)
     row, copy, component, entry = (each[here[copy]] for each in (row, copy, component, entry))
-
-    dof = np.repeat(np.arange(fixed.size), counts.ravel())  # (node, component) of each row
-    within = np.arange(len(dof)) - start[dof]
-    is_fixed = fixed.ravel()[dof]
-    # A gluing row belongs to the rank of the node's first copy, a prescribing row to that of its own copy.
-    anchor = tearing.first_copy[dof // tearing.components] + np.where(is_fixed, within, 0)
-    owner = tearing.subdomain_rank[tearing.copy_subdomain[anchor]]
-    return GluingRows(Rows(row, copy, component, entry, np.zeros(len(dof)), owner), dof, fixed, axes)
+    rows = Rows(row, copy, component, entry, numbers.right, numbers.owner)
+    return GluingRows(rows, numbers.dof, fixed, axes)
 
 
 def _turned_entries(
@@ -327,8 +365,8 @@ class Decomposition:
     """A scene cut into subdomains; each rank holds the meshes of its own.
 
     `block_offset`: first block of dofs of each of them in this rank's torn vector, and the total;
-    `copy_block`: block of each copy in this rank's torn vector, −1 if another rank holds it; `compact`:
-    whether a state fits into memory only with subdomains stored as `LocalKind.COMPACT`.
+    `held`: numbers of the copies of nodes on this rank, ascending, and their blocks in its torn vectors;
+    `compact`: whether a state fits into memory only with subdomains stored as `LocalKind.COMPACT`.
     """
 
     comm: MPI.Comm
@@ -336,7 +374,7 @@ class Decomposition:
     partitions: Mapping[str, np.ndarray]
     meshes: tuple[SubdomainMesh, ...]
     block_offset: np.ndarray
-    copy_block: np.ndarray
+    held: tuple[np.ndarray, np.ndarray]
     gluing: GluingRows
     forms: FormLibrary
     compact: bool = False
@@ -368,16 +406,16 @@ class Decomposition:
         means = [mesh.following.means for mesh in self.meshes]
         return sp.csr_matrix(sp.block_diag([sp.csr_matrix((0, 0)), *means]))
 
-    @cached_property
-    def held(self) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the copies of nodes on this rank, and their blocks in its torn vectors."""
-        here = np.flatnonzero(self.copy_block >= 0)
-        return here, self.copy_block[here]
+    def blocks_of(self, copies: np.ndarray) -> np.ndarray:
+        """Return the block of each copy in this rank's torn vectors, −1 if another rank holds it."""
+        here, block = self.held
+        place = np.minimum(np.searchsorted(here, copies), len(here) - 1)
+        return np.where(here[place] == copies, block[place], -1)
 
     def copies_here(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return for each copy on this rank of some nodes its place among them, its number and its block."""
         place, copy = self.tearing.copies_of(nodes)
-        block = self.copy_block[copy]
+        block = self.blocks_of(copy)
         here = block >= 0
         return place[here], copy[here], block[here]
 
@@ -410,8 +448,7 @@ class Decomposition:
             if np.array_equal(fixed, self.fixed) and same_axes(axes, self.axes):
                 return self
             dependent = dependent_nodes(scene, self.tearing)
-            gluing = gluing_rows(self.tearing, fixed, axes, dependent, self.comm.rank)
-        return replace(self, gluing=gluing)
+        return replace(self, gluing=_glued(self.tearing, fixed, axes, dependent, self.comm))
 
 
 def decompose(
@@ -434,32 +471,46 @@ def decompose(
     if isinstance(partitions, Mapping):
         partitions = with_tool_parts(scene.bodies, partitions)
     check_same_input(comm, scene, partitions=partitions)
-    with together(comm):
-        _check_partitions(scene, partitions)
-        partitions = {name: _whole(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
+    touching = {surface.body for pair in (*scene.contacts, *scene.ties) for surface in pair.surfaces}
+    whole = {name: body.mesh for name, body in scene.bodies.items()}
+    hold_once_a_machine(comm, [*whole.values()], [mesh for name, mesh in whole.items() if name in touching])
+    partitions = once_a_machine(comm, lambda: _checked_partitions(scene, partitions))
     compact = not scene.is_nonlinear and require_memory(scene, partitions, comm, limit=memory)
     forms = FormLibrary(comm)
     forms.prepare(scene)
+    tearing = once_a_machine(comm, lambda: _torn(scene, partitions, comm.size, forms))
     # Ranks agree on errors after each local stage, before the next collective one.
     with together(comm):
-        rank = _dealt(scene, partitions, comm.size)
-        if len(rank) < comm.size:
+        if tearing.n_subdomains < comm.size:
             raise InvalidInputError(
-                f"{comm.size} ranks need as many subdomains, got {len(rank)}: use scene.partition"
+                f"{comm.size} ranks need as many subdomains, got {tearing.n_subdomains}: use scene.partition"
             )
-        tearing = tear(scene, partitions, rank, cell_stiffness(scene, forms))
         here = np.flatnonzero(tearing.subdomain_rank == comm.rank)
         _check_communicators(len(here), each=20 if scene.is_nonlinear else 14)
     with together(comm):
         meshes = tuple(_cut(scene, partitions, tearing, here))
         prescribed, axes = prescribed_along(scene, tearing)
         dependent = dependent_nodes(scene, tearing)
-        gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes, dependent, comm.rank)
+    gluing = _glued(tearing, ~np.isnan(prescribed), axes, dependent, comm)
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
-    copy_block = _copy_blocks(tearing, meshes, block_offset)
-    return Decomposition(
-        comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, forms, compact
-    )
+    held = _held(tearing, meshes, block_offset)
+    return Decomposition(comm, tearing, dict(partitions), meshes, block_offset, held, gluing, forms, compact)
+
+
+def _torn(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, forms: FormLibrary) -> Tearing:
+    """Cut the bodies, see `tear`, and compute what follows from the cuts alone."""
+    tearing = tear(scene, partitions, _dealt(scene, partitions, ranks), cell_stiffness(scene, forms))
+    _ = tearing.copy_share, tearing.on_several_ranks  # which stay with it: held once a machine, too
+    return tearing
+
+
+def _glued(
+    tearing: Tearing, fixed: np.ndarray, axes: LocalAxes, dependent: np.ndarray, comm: MPI.Comm
+) -> GluingRows:
+    """Return the gluing rows with their entries on this rank's copies. Collective on ``comm``."""
+    numbers = once_a_machine(comm, lambda: GluingNumbers.of(tearing, fixed, dependent))
+    with together(comm):
+        return rows_of(tearing, numbers, axes, dependent, comm.rank)
 
 
 def _whole(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
@@ -467,7 +518,7 @@ def _whole(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
     return kept_together(mesh, pieces(mesh, partition))
 
 
-def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> None:
+def _checked_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     if not isinstance(partitions, Mapping):
         raise InvalidInputError(f"partitions must be by names of bodies, got {partitions!r}: leave it out")
     for name, body in scene.bodies.items():
@@ -478,6 +529,7 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
             given = partition.shape if isinstance(partition, np.ndarray) else repr(partition)
             raise InvalidInputError(f"partitions[{name!r}] needs shape ({body.mesh.n_cells},), got {given}")
         check_face_connected(body.mesh, pieces(body.mesh, partition))
+    return {name: _whole(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
 
 
 def _dealt(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int) -> np.ndarray:
@@ -514,14 +566,21 @@ def _cut(
         yield cut_out(int(number), name, scene.bodies[name], cells, spaces)
 
 
-def _copy_blocks(tearing: Tearing, meshes: tuple[SubdomainMesh, ...], block_offset: np.ndarray) -> np.ndarray:
-    total = tearing.n_subdomains
-    keys = tearing.copy_node * total + tearing.copy_subdomain
-    blocks = np.full(len(keys), -1, dtype=np.int64)
-    for mesh, offset in zip(meshes, block_offset[:-1], strict=True):
-        wanted = tearing.global_nodes(mesh.body, mesh.nodes) * total + mesh.number
-        blocks[np.searchsorted(keys, wanted)] = offset + np.arange(len(mesh.nodes))
-    return blocks
+def _held(
+    tearing: Tearing, meshes: tuple[SubdomainMesh, ...], block_offset: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the copies of nodes on this rank, ascending, and their blocks in its torn vectors."""
+    parts = [tearing.copies_in(tearing.global_nodes(mesh.body, mesh.nodes), mesh.number) for mesh in meshes]
+    copies = np.concatenate(parts)
+    order = np.argsort(copies)
+    return copies[order], order
+
+
+def _in_order(owner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the owners of rows, and the position of each row where they are in the order of owners."""
+    position = np.empty(len(owner), dtype=np.int64)
+    position[np.argsort(owner, kind="stable")] = np.arange(len(owner))
+    return owner, position
 
 
 class DualNumbering:
@@ -537,13 +596,10 @@ class DualNumbering:
         """Build numbering and exchange. Collective on ``comm``."""
         self.comm = comm
         self.total = len(owner)
-        self.owner, self._touched = owner, touched
-        order = np.argsort(owner, kind="stable")
-        self._position = np.empty(self.total, dtype=np.int64)
-        self._position[order] = np.arange(self.total)
-        starts = np.searchsorted(owner[order], np.arange(comm.size + 1))
-        self.offset = int(starts[comm.rank])
-        self.owned = order[starts[comm.rank] : starts[comm.rank + 1]]
+        self.owner, self._position = once_a_machine(comm, lambda: _in_order(owner))
+        self._touched = touched
+        self.owned = np.flatnonzero(self.owner == comm.rank)
+        self.offset = int(np.count_nonzero(self.owner < comm.rank))
         self.ghosts = touched[owner[touched] != comm.rank]
         self._messages = count_of_exchange(comm, owner[self.ghosts])
         self._vector = PETSc.Vec().createGhost(

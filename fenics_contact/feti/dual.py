@@ -381,12 +381,12 @@ class DualSystem:
 
         R are the unresisted motions; (k, torn_size) and (k, k).
         """
-        tearing, here = self.torn.decomposition.tearing, self.torn.decomposition.copy_block
+        tearing, (copy, block) = self.torn.decomposition.tearing, self.torn.decomposition.held
         meshes = (self.torn.scene.bodies[name].mesh for name in tearing.body_names)
         volumes = [node_volumes(mesh.points, mesh.cells) for mesh in meshes]
         share = np.concatenate(volumes) / tearing.multiplicity
         weight = np.empty(self.unheld.shape[0] // tearing.components)
-        weight[here[here >= 0]] = share[tearing.copy_node[here >= 0]]
+        weight[block] = share[tearing.copy_node[copy]]
         weighted = (self.unheld.T @ sp.diags(np.repeat(weight, tearing.components))).tocsr()
         return weighted, self.torn.numbering.comm.allreduce((weighted @ self.unheld).toarray())
 

@@ -572,7 +572,7 @@ def _log_held(rows: TangentialRows, fixed: np.ndarray) -> None:
 def _numbered(groups: RowGroups, decomposition: Decomposition, known: DualNumbering | None) -> NumberedRows:
     """Number the multipliers and select the entries of B that act on this rank's subdomains. Collective."""
     rows = stack([group.rows(decomposition.tearing, decomposition.fixed) for group in groups])
-    block = decomposition.copy_block[rows.copy]
+    block = decomposition.blocks_of(rows.copy)
     here = block >= 0
     row, column = rows.row[here], decomposition.tearing.components * block[here] + rows.component[here]
     touched, comm = np.unique(row), decomposition.comm

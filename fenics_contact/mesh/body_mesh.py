@@ -571,11 +571,14 @@ class BodyMesh:
         pyramid into 10, see `cells_cut`; facets likewise. A surface of triangles and quadrilaterals has
         triangles alone. There is no grid.
         """
+        pieces = self.linear_pieces()
+        return self.with_linear_pieces(pieces) if pieces else self
+
+    def linear_pieces(self) -> dict[str, Any]:
+        """Return cells, surfaces and regions of the `linear` mesh; nothing if it is the mesh itself."""
         several = self.has_several_shapes
         if self.order == 1 and not (several and any(map(has_both, self.surfaces.values()))):
-            return self
-        result = copy(self)
-        result.__dict__.pop("apart", None)
+            return {}
         kind = cell_type_of(self.cells, self.dim)
         if several and self.order == 1:
             cells = self.cells
@@ -584,14 +587,22 @@ class BodyMesh:
         else:
             cells = self.cells[:, kind.pieces].reshape(-1, kind.pieces.shape[1])
         parents = self.cells_cut
-        result._set(
-            cells=cells,
-            surfaces={name: linear_facets(facets, self.dim).rows for name, facets in self.surfaces.items()},
-            grid=None,
-            regions={
+        return {
+            "cells": cells,
+            "surfaces": {
+                name: linear_facets(facets, self.dim).rows for name, facets in self.surfaces.items()
+            },
+            "regions": {
                 name: np.flatnonzero(np.isin(parents, numbers)) for name, numbers in self.regions.items()
             },
-        )
+        }
+
+    def with_linear_pieces(self, pieces: Mapping[str, Any]) -> BodyMesh:
+        """Return the `linear` mesh that has these pieces."""
+        result = copy(self)
+        for name in ("apart", "linear"):
+            result.__dict__.pop(name, None)
+        result._set(grid=None, **pieces)
         return result
 
     @property

@@ -160,7 +160,7 @@ def test_the_preconditioner_is_the_scaled_schur_complement(system: DualSystem, k
         S[np.ix_(here[b], here[b])] = K[np.ix_(b, b)] - inner
         start += subdomain.mesh.size
     decomposition = system.torn.decomposition
-    softness.reshape(-1, 3)[decomposition.copy_block] = 1.0 / decomposition.tearing.copy_stiffness[:, None]
+    softness.reshape(-1, 3)[decomposition.held[1]] = 1.0 / decomposition.tearing.copy_stiffness[:, None]
     weighted = B * softness
     gram = weighted @ B.T
     gram[n:, n:] += REGULARISATION * np.diag(np.diag(gram[n:, n:]))

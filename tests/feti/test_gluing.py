@@ -208,7 +208,7 @@ def torn_in_contact() -> TornSystem:
 def in_space(torn_in_contact: TornSystem, field: np.ndarray) -> np.ndarray:
     """Give every copy of a node the displacement of the node, shape (n_nodes, 3) -> (torn_size,)."""
     blocks = np.empty((torn_in_contact.B.shape[1] // 3, 3))
-    blocks[torn_in_contact.decomposition.copy_block] = field[torn_in_contact.decomposition.tearing.copy_node]
+    blocks[torn_in_contact.decomposition.held[1]] = field[torn_in_contact.decomposition.tearing.copy_node]
     return blocks.ravel()
 
 

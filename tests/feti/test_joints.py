@@ -82,7 +82,7 @@ def test_rows_are_numbered_kind_by_kind(torn: TornSystem) -> None:
 def test_rows_of_b_measure_what_the_joint_says(torn: TornSystem, joint: Joint) -> None:
     moved, decomposition = field(torn, free=True), torn.decomposition
     copies = np.empty((decomposition.torn_size // 3, 3))
-    copies[decomposition.copy_block] = moved[decomposition.tearing.copy_node]
+    copies[decomposition.held[1]] = moved[decomposition.tearing.copy_node]
     measured = torn.gathered(torn.jump(copies.ravel()), joint)
     acting = ~joint.held(decomposition.fixed)
     assert acting.any()
