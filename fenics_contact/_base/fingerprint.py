@@ -101,8 +101,14 @@ for _kind in (Enum, IntEnum, StrEnum):
 
 @_parts.register(np.ndarray)
 def _(value: np.ndarray, name: str) -> Parts:
-    digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
+    digest = hashlib.sha256(_bits(value)).hexdigest()[:16]
     return f"{value.dtype} array of shape {value.shape}, sha256 {digest}", []
+
+
+def _bits(value: np.ndarray) -> bytes | memoryview:
+    """Return the bits of an array; of numbers without a copy."""
+    array = np.ascontiguousarray(value)
+    return array.reshape(-1).view(np.uint8).data if array.dtype.kind in "biufc" else array.tobytes()
 
 
 @_parts.register(Mapping)

@@ -12,6 +12,7 @@ from fenics_contact._base.checks import kind_in_words
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._base.shared import once_a_machine
 from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.linear import DirectEquilibria, LinearEquilibria, default_solver
@@ -99,12 +100,10 @@ class ContactProblem:
     def partitions(self) -> Mapping[str, np.ndarray]:
         """Body name -> subdomain of every cell, numbered from 0 within the body. Collective on first use."""
         if self._partitions is None:
-            with together(self.comm):
-                usual = self.scene.partition(self.comm.size)
+            usual = once_a_machine(self.comm, lambda: self.scene.partition(self.comm.size))
             linear = not self.scene.is_nonlinear
             if linear and Fit.of(self.scene, usual, self.comm, limit=self._memory).is_tighter:
-                with together(self.comm):
-                    usual = self.scene.partition(self.comm.size, lean=True)
+                usual = once_a_machine(self.comm, lambda: self.scene.partition(self.comm.size, lean=True))
             self._partitions = usual
         return self._partitions
 

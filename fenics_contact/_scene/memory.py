@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.memory import addressable_memory, available_memory
+from fenics_contact._base.shared import once_a_machine, ranks_of_machine
 from fenics_contact._base.sparse import factor_bytes, prefers_explicit
 from fenics_contact._scene.checks import check_positive
 from fenics_contact._scene.dealing import Dealing
@@ -27,7 +28,8 @@ class Rates:
 
     Attributes:
         start: What a rank needs at first, whatever the scene.
-        tables: Numbering, gluing rows and meshes, of each torn unknown on every rank.
+        tables: Numbering, gluing rows and meshes, of each torn unknown on every machine.
+        alone: What a rank holds of the whole problem for itself, of each torn unknown.
         own: Kernels, coordinates and loads, of each torn unknown.
         system: Rows of B, coarse space and vectors, of each torn unknown.
         entry: Of an entry of a sparse matrix.
@@ -45,6 +47,7 @@ class Rates:
 
     start: float = 9e6
     tables: float = 55.0
+    alone: float = 5.0
     own: float = 100.0
     system: float = 110.0
     entry: float = 12.0
@@ -126,24 +129,26 @@ def expected_memory(
     scene: SceneParts,
     parts: Subdomains,
     ranks: int = 1,
-    rates: Rates | None = None,
     *,
     compact: bool = False,
+    machines: int = 1,
 ) -> float:
     """Return the largest memory that a state takes on all ranks together, without libraries, [bytes].
 
     It is the largest one of that with all stiffness matrices, that while the last subdomains are factored,
     and that while the dual problem is solved. Subdomains of a rank that are alike count once.
 
-    `compact`: whether each is stored as one triangle in single precision, `LocalKind.COMPACT`.
+    `compact`: whether each is stored as one triangle in single precision, `LocalKind.COMPACT`; `machines`:
+    how many the ranks are on, each of which holds the tables once.
     """
-    rates = rates or Rates()
+    rates = Rates()
     torn = int(parts.size.sum())
     nodes = sum(body.mesh.n_nodes for body in scene.bodies.values())
     fixed = sum(int(np.count_nonzero(scene.fixed(name))) for name in scene.body_names)
     multipliers = torn - scene.components * nodes + fixed
     meshes = sum(body.mesh.points.nbytes + body.mesh.cells.nbytes for body in scene.bodies.values())
-    steady = ranks * (rates.start + meshes + rates.tables * torn) + rates.own * torn
+    steady = machines * (meshes + rates.tables * torn) + ranks * (rates.start + rates.alone * torn)
+    steady += rates.own * torn
     factors = workspaces = assembled = 0.0
     dealt = parts.dealt(ranks)
     for rank in range(ranks):
@@ -203,13 +208,13 @@ class Fit:
             _check_limit(limit)
         if limit is None and _unknowns(scene) <= small:
             return cls()
-        machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
-        ranks, share = machine.size, machine.size / comm.size
-        machine.Free()
+        ranks = ranks_of_machine(comm).size
+        share = ranks / comm.size
+        parts = once_a_machine(comm, lambda: Subdomains.of(scene, partitions))
         with together(comm):
-            parts = Subdomains.of(scene, partitions)
-            fast = expected_memory(scene, parts, comm.size)
-            compact = expected_memory(scene, parts, comm.size, compact=True)
+            machines = round(1.0 / share)
+            fast = expected_memory(scene, parts, comm.size, machines=machines)
+            compact = expected_memory(scene, parts, comm.size, compact=True, machines=machines)
             left = limit or _left(ranks)
         each = comm.allgather((left / share, left, share))
         _, left, share = min(each, key=lambda one: one[0])

@@ -54,8 +54,14 @@ def peak_memory() -> int:
     """Return the largest resident memory of this process so far, [byte]; 0 where it is not available.
 
     Linux records it by address space; `resource.getrusage` would also count the process before it became this
-    program. Pages that ranks share are counted on each of them.
+    program. Of pages that ranks share now, see `once_a_machine`, each counts its share.
     """
-    status = Path("/proc/self/status")
-    lines = status.read_text().splitlines() if status.exists() else []
-    return sum(1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM:"))
+    largest, resident = (_listed("status", name) for name in ("VmHWM:", "RssShmem:"))
+    return largest - resident + min(_listed("smaps_rollup", "Pss_Shmem:"), resident)
+
+
+def _listed(table: str, wanted: str) -> int:
+    """Return a size that Linux lists for this process, [byte]; 0 where it does not."""
+    file = Path("/proc/self") / table
+    lines = file.read_text().splitlines() if file.exists() else []
+    return sum(1024 * int(line.split()[1]) for line in lines if line.startswith(wanted))

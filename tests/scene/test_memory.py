@@ -50,13 +50,16 @@ def test_kinds_matrices_and_interfaces_are_those_that_are_built(name: str) -> No
     assert known.couplings @ known.size == pytest.approx(entries, rel=0.05)
 
 
-def test_every_rank_has_factors_and_tables_of_its_own() -> None:
+def test_every_rank_has_factors_of_its_own_and_a_machine_one_set_of_tables() -> None:
     scene, parts = cut("equal")
     known, rates = Subdomains.of(scene, parts), Rates()
     alone, two = expected_memory(scene, known), expected_memory(scene, known, 2)
-    tables = rates.start + rates.tables * known.size.sum()
-    assert two > alone + tables
-    assert two < 2.0 * alone
+    tables = rates.tables * known.size.sum() + sum(
+        array.nbytes for array in (scene.bodies["block"].mesh.points, scene.bodies["block"].mesh.cells)
+    )
+    assert two > alone + rates.start + rates.alone * known.size.sum()
+    assert two < 2.0 * alone - tables
+    assert expected_memory(scene, known, 2, machines=2) == pytest.approx(two + tables)
     unlike = Subdomains.of(*cut("bent"))
     assert len(set(unlike.kind)) == len(unlike.size) == 12
     assert scene.plan(parts).memory == alone
