@@ -102,6 +102,11 @@ class RowGroups:
         """Return what prescribed displacements are in all rows of free ones, shape (total,), [length]."""
         return np.concatenate([each.of_supports(prescribed) for each in self.members])
 
+    def sides(self, scene: Scene, prescribed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what supports are in all rows, and c less that, shape (total,) each, [length]."""
+        supported = self.of_supports(prescribed)
+        return supported, np.concatenate([each.right(scene, prescribed) for each in self.members]) - supported
+
     @property
     def compliance(self) -> np.ndarray:
         """The diagonal of C of all rows, shape (total,), [length / force]."""

@@ -157,15 +157,12 @@ class Rows:
         return len(self.right)
 
 
-def stack(parts: Sequence[Rows]) -> Rows:
-    """Number the rows of several groups consecutively."""
+def entries(parts: Sequence[Rows]) -> tuple[np.ndarray, ...]:
+    """Return row, copy, component and value of the entries of several groups, numbered consecutively."""
     starts = np.cumsum([0] + [part.count for part in parts])
     row = np.concatenate([part.row + start for part, start in zip(parts, starts, strict=False)])
-    joined = [
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in ("copy", "component", "value", "right", "owner")
-    ]
-    return Rows(row, *joined)
+    names = ("copy", "component", "value")
+    return row, *(np.concatenate([getattr(part, name) for part in parts]) for name in names)
 
 
 def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
@@ -442,9 +439,8 @@ class Decomposition:
 
         In Total FETI what supports hold is in these rows alone: matrices, kernels and factors stay.
         """
+        fixed, axes = once_a_machine(self.comm, lambda: _fixed(scene, self.tearing))
         with together(self.comm):
-            prescribed, axes = prescribed_along(scene, self.tearing)
-            fixed = ~np.isnan(prescribed)
             if np.array_equal(fixed, self.fixed) and same_axes(axes, self.axes):
                 return self
             dependent = dependent_nodes(scene, self.tearing)
@@ -489,9 +485,9 @@ def decompose(
         _check_communicators(len(here), each=20 if scene.is_nonlinear else 14)
     with together(comm):
         meshes = tuple(_cut(scene, partitions, tearing, here))
-        prescribed, axes = prescribed_along(scene, tearing)
         dependent = dependent_nodes(scene, tearing)
-    gluing = _glued(tearing, ~np.isnan(prescribed), axes, dependent, comm)
+    fixed, axes = once_a_machine(comm, lambda: _fixed(scene, tearing))
+    gluing = _glued(tearing, fixed, axes, dependent, comm)
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
     held = _held(tearing, meshes, block_offset)
     return Decomposition(comm, tearing, dict(partitions), meshes, block_offset, held, gluing, forms, compact)
@@ -502,6 +498,12 @@ def _torn(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, forms:
     tearing = tear(scene, partitions, _dealt(scene, partitions, ranks), cell_stiffness(scene, forms))
     _ = tearing.copy_share, tearing.on_several_ranks  # which stay with it: held once a machine, too
     return tearing
+
+
+def _fixed(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalAxes]:
+    """Return the marks of prescribed components of nodes, shape (n_nodes, dim), and along which axes."""
+    prescribed, axes = prescribed_along(scene, tearing)
+    return ~np.isnan(prescribed), axes
 
 
 def _glued(
@@ -576,11 +578,11 @@ def _held(
     return copies[order], order
 
 
-def _in_order(owner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the owners of rows, and the position of each row where they are in the order of owners."""
+def _in_order(owner: np.ndarray) -> np.ndarray:
+    """Return the position of each row where they are in the order of owners."""
     position = np.empty(len(owner), dtype=np.int64)
     position[np.argsort(owner, kind="stable")] = np.arange(len(owner))
-    return owner, position
+    return position
 
 
 class DualNumbering:
@@ -593,13 +595,13 @@ class DualNumbering:
     """
 
     def __init__(self, comm: MPI.Comm, owner: np.ndarray, touched: np.ndarray) -> None:
-        """Build numbering and exchange. Collective on ``comm``."""
+        """Build numbering and exchange; owners are held once a machine. Collective on ``comm``."""
         self.comm = comm
         self.total = len(owner)
-        self.owner, self._position = once_a_machine(comm, lambda: _in_order(owner))
-        self._touched = touched
-        self.owned = np.flatnonzero(self.owner == comm.rank)
-        self.offset = int(np.count_nonzero(self.owner < comm.rank))
+        self.owner, self._touched = owner, touched
+        self._position = once_a_machine(comm, lambda: _in_order(owner))
+        self.owned = np.flatnonzero(owner == comm.rank)
+        self.offset = int(np.count_nonzero(owner < comm.rank))
         self.ghosts = touched[owner[touched] != comm.rank]
         self._messages = count_of_exchange(comm, owner[self.ghosts])
         self._vector = PETSc.Vec().createGhost(

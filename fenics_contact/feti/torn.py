@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import displayed
+from fenics_contact._base.shared import once_a_machine
 from fenics_contact._fem.loads import as_tractions
 from fenics_contact._pairing.advice import ADVICE, SILENCE, Advice
 from fenics_contact._pairing.points import (
@@ -29,7 +30,7 @@ from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.all_rows import RowCompliance, RowGroups
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
-from fenics_contact.feti.decomposition import Decomposition, DualNumbering, prescribed_along, stack
+from fenics_contact.feti.decomposition import Decomposition, DualNumbering, entries, prescribed_along
 from fenics_contact.feti.free_motions import FreeMotions, free_motions
 from fenics_contact.feti.initial_gaps import check_no_penetration
 from fenics_contact.feti.joints import JOINTS
@@ -415,8 +416,8 @@ def build_torn_system(
             )
             for mesh, earlier in zip(decomposition.meshes, known, strict=True)
         )  # fmt: skip
+    prescribed, _ = once_a_machine(comm, lambda: prescribed_along(scene, decomposition.tearing))
     with together(comm):
-        prescribed, _ = prescribed_along(scene, decomposition.tearing)
         free = free_motions(scene, decomposition.tearing)
     if previous is not None and _is_alike(scene, decomposition, previous, prescribed):
         # Only loads and prescribed values changed: B stays the same object, which marks F as unchanged, too.
@@ -431,7 +432,7 @@ def with_points(torn: TornSystem, points: ContactPoints) -> TornSystem:
     if points is torn.points:
         return torn
     scene, decomposition = torn.scene, torn.decomposition
-    prescribed, _ = prescribed_along(scene, decomposition.tearing)
+    prescribed, _ = once_a_machine(decomposition.comm, lambda: prescribed_along(scene, decomposition.tearing))
     groups = _with_contact(scene, decomposition, torn.groups.joints, points, prescribed)
     rows = _numbered(groups, decomposition, torn.numbering)
     free = free_motions(scene, decomposition.tearing)
@@ -462,15 +463,14 @@ def _at_rest(
 ) -> TornSystem:
     """Return the system with what its rows measure at rest and under supports. Collective."""
     groups, owned, comm = rows.groups, rows.numbering.owned, decomposition.comm
+    supported, right = once_a_machine(comm, lambda: groups.sides(scene, prescribed))
     with together(comm):
-        right = np.concatenate([group.right(scene, prescribed) for group in groups])
         for joint in groups.joints:
             joint.check(scene, prescribed, free.columns)
         free = free.on_rows(groups, decomposition.fixed, owned)
-    supported = groups.of_supports(prescribed)
     return TornSystem(
-        scene, decomposition, subdomains, groups, rows.numbering, rows.B, supported[owned],
-        (right - supported)[owned], np.zeros((len(groups.slips.frictionless), scene.components - 1)),
+        scene, decomposition, subdomains, groups, rows.numbering, rows.B, supported[owned], right[owned],
+        np.zeros((len(groups.slips.frictionless), scene.components - 1)),
         free.with_unknowns(groups.unknowns(scene), owned),
     )  # fmt: skip
 
@@ -571,15 +571,18 @@ def _log_held(rows: TangentialRows, fixed: np.ndarray) -> None:
 
 def _numbered(groups: RowGroups, decomposition: Decomposition, known: DualNumbering | None) -> NumberedRows:
     """Number the multipliers and select the entries of B that act on this rank's subdomains. Collective."""
-    rows = stack([group.rows(decomposition.tearing, decomposition.fixed) for group in groups])
-    block = decomposition.blocks_of(rows.copy)
+    comm, tearing = decomposition.comm, decomposition.tearing
+    parts = [each.rows(tearing, decomposition.fixed) for each in groups]
+    owner = once_a_machine(comm, lambda: np.concatenate([part.owner for part in parts]))
+    row, copy, component, value = entries(parts)
+    block = decomposition.blocks_of(copy)
     here = block >= 0
-    row, column = rows.row[here], decomposition.tearing.components * block[here] + rows.component[here]
-    touched, comm = np.unique(row), decomposition.comm
+    row, column = row[here], tearing.components * block[here] + component[here]
+    touched = np.unique(row)
     # The communication pattern is reused as long as no rank's share of the rows changes.
-    stays = known is not None and known.serves(rows.owner, touched)
+    stays = known is not None and known.serves(owner, touched)
     if comm.allreduce(int(not stays)) or known is None:
-        known = DualNumbering(comm, rows.owner, touched)
+        known = DualNumbering(comm, owner, touched)
     shape = (len(known.local_rows), decomposition.torn_size)
-    B = sp.csr_matrix((rows.value[here], (known.local_index(row), column)), shape=shape)
+    B = sp.csr_matrix((value[here], (known.local_index(row), column)), shape=shape)
     return NumberedRows(groups, known, B)
