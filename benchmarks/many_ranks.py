@@ -1,13 +1,14 @@
 """A model of time on many ranks, from counts as `state.costs` has them.
 
 `python -m benchmarks.many_ranks` prints what it says of up to ten thousand ranks; under mpirun with `--check`
-its counts beside those of a run, with `--memory` the memory of each rank. See `docs/scaling.md`.
+its counts beside those of a run, with `--memory` the memory of each rank. The model is given products: with
+`--products` they are counted, for more and more subdomains. See `docs/scaling.md`.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from math import log2
 from time import perf_counter
@@ -16,15 +17,32 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from scipy.linalg import blas
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from benchmarks.cases.scenes import block_mesh, block_on_plane
-from fenics_contact import LinearState, Scene, box_partition, solve_scene
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Coulomb,
+    FixedPoint,
+    LinearState,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+    Tresca,
+    box_partition,
+    solve_scene,
+)
 from fenics_contact._base.sparse import FACTOR_BYTES, ROWS_PER_RANK, prefers_explicit
 from fenics_contact.feti.reduced_coarse import Elimination
 from fenics_contact.gallery import block
-from fenics_contact.qp import FaceNewton
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.qp import DualProblem, DualSolver, FaceNewton, Smalse
 from fenics_contact.qp.coarse import DENSE_LIMIT
 from fenics_contact.results import PhaseCosts
+from fenics_contact.results.linear_state import as_linear
 from fenics_contact.study.report import table
 from fenics_contact.study.worker import peak_memory
 
@@ -294,6 +312,87 @@ def memory(comm: MPI.Comm, edge: int = 6, a_rank: int = 6) -> str:
     )
 
 
+@dataclass(frozen=True)
+class Cube:
+    """A unit cube of side³ equal boxes, clamped at x0, pressed on a rigid plane and dragged over it.
+
+    Attributes:
+        side: Subdomains along an edge.
+        edge: Elements along an edge of a subdomain, H/h.
+        traction: On the upper side: one that presses all nodes on the plane, by default.
+    """
+
+    side: int
+    edge: int
+    traction: tuple[float, float, float] = (200.0, 0.0, -500.0)
+
+    def solved(self, law: str, solver: DualSolver) -> LinearState:
+        """Return the state under a law: linear, that is without a plane, frictionless, Tresca or Coulomb."""
+        friction = {"frictionless": None, "Tresca": Tresca(60.0), "Coulomb": Coulomb(0.3)}
+        mesh, plane = (
+            block((0, 0, 0), (1, 1, 1), (self.side * self.edge,) * 3),
+            RigidPlane((0, 0, 0), (0, 0, 1)),
+        )
+        contacts = [ContactPair(Surface("cube", "z0"), plane, friction[law])] if law in friction else []
+        given = Scene(
+            {"cube": Body(mesh, IsotropicElasticity(2.1e5, 0.3))},
+            [Support("cube", "x0")],
+            [Traction("cube", "z1", self.traction)],
+            contacts,
+        )
+        parts = {"cube": box_partition(mesh, (self.side,) * 3)}
+        return as_linear(solve_scene(given, MPI.COMM_SELF, partitions=parts, solver=solver), "products")
+
+    @property
+    def condition(self) -> float:
+        """κ, the ratio of the extreme eigenvalues of P F P on Ker G."""
+        least, largest = spectrum(self.solved("Tresca", FaceNewton(tolerance=1e-3)).dual.problem)
+        return largest / least
+
+
+def spectrum(problem: DualProblem, accuracy: float = 1e-2) -> tuple[float, float]:
+    """Return the extreme eigenvalues of P F P on Ker G, on one rank; F is regular there."""
+    project, size = problem.coarse.project, problem.layout.size
+    start = project(np.random.default_rng(0).standard_normal(size))
+    settings = {"k": 1, "return_eigenvectors": False, "v0": start, "tol": accuracy}
+
+    def shifted(shift: float) -> LinearOperator:
+        def apply(x: np.ndarray) -> np.ndarray:
+            inside = project(x)
+            return project(problem.operator(inside)) + shift * (x - inside)
+
+        return LinearOperator((size, size), matvec=apply, dtype=np.float64)
+
+    largest = float(eigsh(shifted(0.0), which="LA", **settings)[0])
+    return float(eigsh(shifted(largest), which="SA", **settings)[0]), largest
+
+
+#: Solvers that are compared, by the law of friction.
+COMPARED: dict[str, tuple[DualSolver, ...]] = {
+    **dict.fromkeys(("linear", "frictionless", "Tresca"), (FaceNewton(), Smalse())),
+    "Coulomb": (FaceNewton(), FixedPoint(FaceNewton()), FixedPoint(Smalse())),
+}
+#: Subdomains along an edge and elements along that of each: many of one size, few of several.
+LATTICES = ((2, 4), (3, 4), (4, 4), (6, 4), (8, 4), (3, 2), (3, 8))
+#: Tractions that press all nodes on the plane, and that lift some.
+TRACTIONS = {"all nodes closed": (200.0, 0.0, -500.0), "some open": (300.0, 60.0, -200.0)}
+
+
+def counted_products() -> Iterator[str]:
+    """Yield tables of products and, in brackets, Newton steps or outer iterations, to residuals of 1e-6."""
+    head = ("subdomains", "H/h", "κ", *(f"{law}: Newton, SMALSE" for law in COMPARED if law != "Coulomb"))
+    conditions = [f"{Cube(*lattice).condition:.1f}" for lattice in LATTICES]
+    for words, traction in TRACTIONS.items():
+        body = []
+        for (side, edge), condition in zip(LATTICES, conditions, strict=True):
+            cube, row = Cube(side, edge, traction), [str(side**3), str(edge), condition]
+            for law, solvers in COMPARED.items():
+                found = [cube.solved(law, solver).solution for solver in solvers]
+                row.append(", ".join(f"{each.products} ({each.iterations})" for each in found))
+            body.append(tuple(row))
+        yield f"{words}\n\n{table((*head, 'Coulomb: Newton, fixed points of Newton, of SMALSE'), body)}"
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -302,8 +401,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--edge", type=int, default=6, help="elements along an edge of a subdomain")
     parser.add_argument("--check", action="store_true", help="compare the counts of a run")
     parser.add_argument("--memory", action="store_true", help="measure the memory of each rank")
+    parser.add_argument("--products", action="store_true", help="count products, by subdomains; on one rank")
     settings, comm = parser.parse_args(arguments), MPI.COMM_WORLD
-    if settings.memory:
+    if settings.products:
+        words = "\n\n".join(counted_products())
+    elif settings.memory:
         words = memory(comm, settings.edge)
     elif settings.check:
         here, run = measured(comm), checked(comm, edge=settings.edge)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from benchmarks.many_ranks import Lattice, Machine, extrapolated, main
+from benchmarks.many_ranks import Lattice, Machine, counted_products, extrapolated, main
 from fenics_contact.qp.coarse import DENSE_LIMIT
 from fenics_contact.results import PhaseCosts
 
@@ -80,3 +80,17 @@ def test_the_table_says_what_outgrows_the_subdomains(capsys: pytest.CaptureFixtu
     assert rows[-1][5] > 1000 * rows[-1][3]
     assert rows[2][5] < 0.1 * 3.5 * 8 * 2.3 * (rows[2][2] / 24576) ** 2, "faces factor contact alone"
     assert rows[-1][3] == pytest.approx(rows[2][3], rel=0.15)
+
+
+def test_products_are_tabled_by_subdomains(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("benchmarks.many_ranks.LATTICES", ((2, 2),))
+    closed, opened = counted_products()
+    assert closed.startswith("all nodes closed\n")
+    assert opened.startswith("some open\n")
+    head, _, row = (line.split("|")[1:-1] for line in closed.splitlines()[2:5])
+    assert len(head) == len(row) == 7
+    assert [int(row[0]), int(row[1])] == [8, 2]
+    assert 15.0 < float(row[2]) < 25.0
+    products = [[int(each.split("(")[0]) for each in column.split(",")] for column in row[3:]]
+    assert [len(each) for each in products] == [2, 2, 2, 3]
+    assert all(10 < each[0] < each[-1] < 300 for each in products)
