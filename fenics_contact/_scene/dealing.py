@@ -6,6 +6,7 @@ Neighbours are kept together only where nothing is alike: what ranks exchange is
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -51,12 +52,16 @@ class Dealing:
 class _Shares:
     """What ranks have got so far.
 
-    `known`: ranks that have some of a kind; `load`: seconds of each rank, `room`: what is left for it of the
-    present body.
+    `uneven`: by how much of its share of a body a rank may have more, rather than part of a kind; `known`:
+    ranks that have some of a kind; `load`: seconds of each rank, `room`: what is left for it of its `share`
+    of the present body.
     """
+
+    uneven: ClassVar[float] = 0.1
 
     dealing: Dealing
     ranks: int
+    share: float = 0.0
     known: dict[int, list[int]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -71,9 +76,10 @@ class _Shares:
         )
         which = which.ravel()
         new = np.array([kind not in self.known for kind in given.kind[body[first]].tolist()])
-        total = given.each[body].sum() + given.once[body[first]][new].sum()
-        self.room[:] = total / self.ranks
         alone = (counts == 1) & new
+        # How often factors of others are made depends on how they are dealt.
+        self.share = float(given.each[body].sum() + given.once[body[first]][alone].sum()) / self.ranks
+        self.room[:] = self.share
         groups = [body[which == k] for k in np.flatnonzero(~alone)]
         groups.sort(key=lambda group: -float(given.each[group].sum()))  # a stable sort
         rest = [self._to_known(group) for group in groups]
@@ -94,12 +100,12 @@ class _Shares:
         while len(group):
             rank = self._emptiest()
             once = float(given.once[group[0]])
-            over = once + float(given.each[group].sum()) - self.room[rank]
-            self.room[rank] -= once
+            over = float(given.each[group].sum()) - self.room[rank]
             self.load[rank] += once
             self.known.setdefault(int(given.kind[group[0]]), []).append(rank)
-            # To halve a kind has the price of its factors once more.
-            count = len(group) if over <= once else max(self._fitting(rank, group), 1)
+            # To divide a kind has the price of its factors once more, in time and in memory.
+            whole = over <= max(once, self.uneven * self.share)
+            count = len(group) if whole else max(self._fitting(rank, group), 1)
             group = self._give(rank, group, count)
 
     def _one_after_the_other(self, some: np.ndarray) -> None:
