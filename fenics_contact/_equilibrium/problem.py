@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ from fenics_contact._equilibrium.other_rows import continued
 from fenics_contact._equilibrium.previous import ONLY_STEP, Equilibria, Previous, Wanted, after
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._equilibrium.warnings import ContactWarnings, DeferredWarnings
-from fenics_contact._scene.memory import Fit
+from fenics_contact._scene.memory import Fit, Subdomains
 from fenics_contact._scene.plan import SolverKind, choose_solver
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import InvalidInputError, collectively, together
@@ -101,8 +102,8 @@ class ContactProblem:
         """Body name -> subdomain of every cell, numbered from 0 within the body. Collective on first use."""
         if self._partitions is None:
             usual = once_a_machine(self.comm, lambda: self.scene.partition(self.comm.size))
-            linear = not self.scene.is_nonlinear
-            if linear and Fit.of(self.scene, usual, self.comm, limit=self._memory).is_tighter:
+            linear, counted = not self.scene.is_nonlinear, partial(Subdomains.of, self.scene, usual)
+            if linear and Fit.of(self.scene, counted, self.comm, limit=self._memory).is_tighter:
                 usual = once_a_machine(self.comm, lambda: self.scene.partition(self.comm.size, lean=True))
             self._partitions = usual
         return self._partitions

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -193,7 +193,7 @@ class Fit:
     def of(
         cls,
         scene: SceneParts,
-        partitions: Mapping[str, np.ndarray],
+        counted: Callable[[], Subdomains],
         comm: MPI.Comm,
         *,
         limit: float | None = None,
@@ -201,8 +201,8 @@ class Fit:
     ) -> Fit:
         """Compute it from a partition. Collective; of the machines the one with the least memory counts.
 
-        `limit`: memory that a state may take on a machine, [bytes]; None: what it has left; `small`: unknowns
-        up to which nothing is computed without a limit.
+        `counted`: returns the subdomains; `limit`: memory that a state may take on a machine, [bytes]; None:
+        what it has left; `small`: unknowns up to which nothing is computed without a limit.
         """
         with together(comm):
             _check_limit(limit)
@@ -210,7 +210,7 @@ class Fit:
             return cls()
         ranks = ranks_of_machine(comm).size
         share = ranks / comm.size
-        parts = once_a_machine(comm, lambda: Subdomains.of(scene, partitions))
+        parts = once_a_machine(comm, counted)
         with together(comm):
             machines = round(1.0 / share)
             fast = expected_memory(scene, parts, comm.size, machines=machines)
@@ -229,7 +229,7 @@ def _left(ranks: int) -> float:
 
 def require_memory(
     scene: SceneParts,
-    partitions: Mapping[str, np.ndarray],
+    counted: Callable[[], Subdomains],
     comm: MPI.Comm,
     *,
     limit: float | None = None,
@@ -239,10 +239,10 @@ def require_memory(
 
     Returns whether it fits only where subdomains are stored compactly.
 
-    `limit`: memory that a state may take on a machine, [bytes]; None: what it has left; `certain`: how far
-    the expected memory must exceed what is left, as it is an estimate.
+    `counted`: returns the subdomains; `limit`: memory that a state may take on a machine, [bytes]; None: what
+    it has left; `certain`: how far the expected memory must exceed what is left, as it is an estimate.
     """
-    fit, unknowns = Fit.of(scene, partitions, comm, limit=limit), _unknowns(scene)
+    fit, unknowns = Fit.of(scene, counted, comm, limit=limit), _unknowns(scene)
     needed = min(fit.fast, fit.compact)
     if needed > certain * fit.left:
         left = f"{fit.left / 1e9:.3g} GB {'are left' if limit is None else 'are allowed'}"

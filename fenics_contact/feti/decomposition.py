@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -471,10 +471,11 @@ def decompose(
     whole = {name: body.mesh for name, body in scene.bodies.items()}
     hold_once_a_machine(comm, [*whole.values()], [mesh for name, mesh in whole.items() if name in touching])
     partitions = once_a_machine(comm, lambda: _checked_partitions(scene, partitions))
-    compact = not scene.is_nonlinear and require_memory(scene, partitions, comm, limit=memory)
+    counted = cache(partial(Subdomains.of, scene, partitions))
+    compact = not scene.is_nonlinear and require_memory(scene, counted, comm, limit=memory)
     forms = FormLibrary(comm)
     forms.prepare(scene)
-    tearing = once_a_machine(comm, lambda: _torn(scene, partitions, comm.size, forms))
+    tearing = once_a_machine(comm, lambda: _torn(scene, partitions, counted, comm.size, forms))
     # Ranks agree on errors after each local stage, before the next collective one.
     with together(comm):
         if tearing.n_subdomains < comm.size:
@@ -493,9 +494,16 @@ def decompose(
     return Decomposition(comm, tearing, dict(partitions), meshes, block_offset, held, gluing, forms, compact)
 
 
-def _torn(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, forms: FormLibrary) -> Tearing:
+def _torn(
+    scene: Scene,
+    partitions: Mapping[str, np.ndarray],
+    counted: Callable[[], Subdomains],
+    ranks: int,
+    forms: FormLibrary,
+) -> Tearing:
     """Cut the bodies, see `tear`, and compute what follows from the cuts alone."""
-    tearing = tear(scene, partitions, _dealt(scene, partitions, ranks), cell_stiffness(scene, forms))
+    rank = _dealt(scene, partitions, counted, ranks)
+    tearing = tear(scene, partitions, rank, cell_stiffness(scene, forms))
     _ = tearing.copy_share, tearing.on_several_ranks  # which stay with it: held once a machine, too
     return tearing
 
@@ -534,11 +542,13 @@ def _checked_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> d
     return {name: _whole(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
 
 
-def _dealt(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int) -> np.ndarray:
+def _dealt(
+    scene: Scene, partitions: Mapping[str, np.ndarray], counted: Callable[[], Subdomains], ranks: int
+) -> np.ndarray:
     """Return the rank of each subdomain, body after body."""
     if ranks == 1:
         return np.zeros(sum(int(part.max()) + 1 for part in partitions.values()), dtype=np.int64)
-    parts = Subdomains.of(scene, partitions)
+    parts = counted()
     # Tangents differ wherever bodies are deformed: nothing is alike.
     return (parts.unlike if scene.is_nonlinear else parts).dealt(ranks)
 

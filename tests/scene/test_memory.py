@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -86,9 +87,10 @@ def test_a_scene_that_does_not_fit_into_memory_is_refused_before_it_is_built(
     with pytest.raises(InvalidInputError, match=allowed):
         solve_scene(scene, MPI.COMM_SELF, partitions=parts, memory=0.5 * needed)
     monkeypatch.setattr(memory, "available_memory", lambda: 0.9 * needed)  # an estimate may err
-    assert require_memory(scene, parts, MPI.COMM_SELF)
+    counted = partial(Subdomains.of, scene, parts)
+    assert require_memory(scene, counted, MPI.COMM_SELF)
     monkeypatch.setattr(memory, "available_memory", lambda: None)
-    assert not require_memory(scene, parts, MPI.COMM_SELF)
+    assert not require_memory(scene, counted, MPI.COMM_SELF)
 
 
 def test_subdomains_are_stored_compactly_where_a_state_would_not_fit_otherwise() -> None:
