@@ -67,7 +67,7 @@ class Tearing(NodeNumbers):
 
     def copies_of(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return for each copy of each of some nodes the place of that node among them, and the copy."""
-        copies = self.multiplicity[nodes]
+        copies = self.first_copy[nodes + 1] - self.first_copy[nodes]
         within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
         return np.repeat(np.arange(len(nodes)), copies), np.repeat(self.first_copy[nodes], copies) + within
 
@@ -300,8 +300,8 @@ def rows_of(
     tearing: Tearing, numbers: GluingNumbers, axes: LocalAxes, dependent: np.ndarray, rank: int | None
 ) -> GluingRows:
     """Return gluing rows with these numbers, see `gluing_rows`."""
-    here = np.full(len(tearing.copy_subdomain), rank is None)
-    here |= tearing.subdomain_rank[tearing.copy_subdomain] == rank
+    mine = (tearing.subdomain_rank == rank) | (rank is None)
+    here = mine[tearing.copy_subdomain]
     touched = np.logical_or.reduceat(here, tearing.first_copy[:-1])[:, None]
     multiplicity = tearing.multiplicity
     multiplicity[dependent] = 1
@@ -338,7 +338,7 @@ def _turned_entries(
 
 def _prescribed_entries(tearing: Tearing, fixed: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
     node, component = np.nonzero(fixed)
-    copies = tearing.multiplicity[node]
+    copies = tearing.first_copy[node + 1] - tearing.first_copy[node]
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
     row = np.repeat(start[tearing.components * node + component], copies) + within
     copy = np.repeat(tearing.first_copy[node], copies) + within
