@@ -33,6 +33,7 @@ from fenics_contact import (
     Traction,
     Tresca,
     box_partition,
+    once_a_machine,
     solve_scene,
 )
 from fenics_contact._base.sparse import FACTOR_BYTES, ROWS_PER_RANK, prefers_explicit
@@ -211,14 +212,14 @@ class Lattice:
             return REDUCED[1] * growth + self.steps * DENSE_STEP * (self.pressed / 1536) ** 3
         return MATRICES * self.steps * LU[1] * growth / self.holders(ranks)
 
-    def replicated(self) -> float:
-        """Return the bytes that every rank holds of the whole problem, see `docs/scaling.md`."""
-        return REPLICATED * self.unknowns
+    def held(self) -> float:
+        """Return the bytes that every machine holds of the whole problem, see `docs/scaling.md`."""
+        return HELD_ONCE * self.unknowns
 
 
-#: Bytes for each torn unknown of the whole problem that every rank holds: meshes 26, numbers and owners of
-#: gluing rows 8, copies of nodes 13, numbering and contact points 8.
-REPLICATED = 55.0
+#: Bytes for each torn unknown of the whole problem that every machine holds once: meshes and partition 25,
+#: numbers and owners of gluing rows 15, copies of nodes 10.
+HELD_ONCE = 50.0
 
 
 def extrapolated(machine: Machine, edge: int = 6, a_rank: int = 100_000, most: int = 10_000) -> str:
@@ -232,11 +233,11 @@ def extrapolated(machine: Machine, edge: int = 6, a_rank: int = 100_000, most: i
             (
                 str(ranks), f"{lattice.unknowns:.3g}", str(lattice.motions), f"{local:.3g}",
                 f"{parts['operations'] - local:.3g}", f"{lattice.coarse_factors(ranks):.3g}",
-                f"{parts['messages']:.3g}", f"{parts['global']:.3g}", f"{lattice.replicated() / 1e9:.3g}",
+                f"{parts['messages']:.3g}", f"{parts['global']:.3g}", f"{lattice.held() / 1e9:.3g}",
             )
         )  # fmt: skip
     head = ("ranks", "unknowns", "rigid motions", "subdomains [s]", "coarse, contact [s]")
-    return table((*head, "coarse factors [s]", "messages [s]", "global [s]", "copied [GB a rank]"), body)
+    return table((*head, "coarse factors [s]", "messages [s]", "global [s]", "held [GB a machine]"), body)
 
 
 def measured(comm: MPI.Comm, size: int = 654, count: int = 64) -> Machine:
@@ -295,13 +296,15 @@ def checked(comm: MPI.Comm, side: int = 4, edge: int = 2) -> dict[str, Any]:
     }
 
 
-def memory(comm: MPI.Comm, edge: int = 6, a_rank: int = 6) -> str:
-    """Solve a beam with some subdomains on every rank; return their memory in words. Collective."""
+def memory(comm: MPI.Comm, edge: int = 6, a_rank: int = 2) -> str:
+    """Solve a block with a_rank³ subdomains on every rank; return their memory in words. Collective."""
     imports = peak_memory()
-    length = a_rank * comm.size
-    mesh = block((0.0, 0.0, 0.0), (length, 1.0, 1.0), (edge * length, edge, edge))
+    length, depth, height = (a_rank * n for n in MPI.Compute_dims(comm.size, 3))
+    boxes, cells = (length, depth, height), (edge * length, edge * depth, edge * height)
+    upper = (float(length), float(depth), float(height))
+    mesh = once_a_machine(comm, lambda: block((0.0, 0.0, 0.0), upper, cells))
     given = block_on_plane(mesh, 0.3)
-    partitions = {"block": box_partition(mesh, (length, 1, 1))}
+    partitions = {"block": once_a_machine(comm, lambda: box_partition(mesh, boxes))}
     state = solve_scene(given, comm, partitions=partitions, solver=FaceNewton(tolerance=1e-6))
     every = np.array(comm.allgather((peak_memory() - imports) / 1e6))
     copies = state.costs.total

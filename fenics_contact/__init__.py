@@ -33,7 +33,7 @@ Functions for other tools: SceneResponse, DesignResponse
 Files: read_mesh, read_cad, read_scene_file, write_result, write_vtu, result_page
 
 Long runs: show_progress, Checkpoint, CheckpointError, interruptible, Interrupted, PhaseTimer,
-    clean_environment
+    clean_environment, once_a_machine
 
 Tests of material models: check_hyperelastic, check_history_material
 
@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from fenics_contact._base.launching import clean_environment as clean_environment
     from fenics_contact._base.progress import PhaseTimer as PhaseTimer
     from fenics_contact._base.progress import show_progress as show_progress
+    from fenics_contact._base.shared import once_a_machine as once_a_machine
     from fenics_contact._equilibrium.carried import TransferredState as TransferredState
     from fenics_contact._equilibrium.problem import ContactProblem as ContactProblem
     from fenics_contact._equilibrium.problem import solve_scene as solve_scene
