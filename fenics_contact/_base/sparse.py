@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI, PETSc, check_not_forked, start
 from fenics_contact.errors.ranks import at_common_end
 
@@ -216,9 +217,9 @@ def scaled_columns(matrix: sp.csr_matrix, factors: np.ndarray) -> sp.csr_matrix:
 
 def _with_values(matrix: sp.csr_matrix, values: np.ndarray) -> sp.csr_matrix:
     if np.count_nonzero(values) == len(values):
-        return sp.csr_matrix((values, matrix.indices, matrix.indptr), shape=matrix.shape)
+        return Csr((values, matrix.indices, matrix.indptr), shape=matrix.shape)
     # Zeros are taken out in place: the pattern must not be that of the given matrix.
-    result = sp.csr_matrix((values, matrix.indices, matrix.indptr), shape=matrix.shape, copy=True)
+    result = Csr((values, matrix.indices.copy(), matrix.indptr.copy()), shape=matrix.shape)
     result.eliminate_zeros()
     return result
 
@@ -305,7 +306,7 @@ class SharedFactor:
         row, column, value = sent(self._comm, holder, entries.row, entries.col, values)
         first = self._bounds[min(self._comm.rank, self.holders - 1)]
         height = self._bounds[self._comm.rank + 1] - first if self._comm.rank < self.holders else 0
-        return sp.csr_matrix((value, (row - first, column)), shape=(height, self.size))
+        return Csr((value, (row - first, column)), shape=(height, self.size))
 
     def _factor(self, rows: sp.csr_matrix) -> None:
         start, height = self._bounds[self._comm.rank], rows.shape[0]
@@ -313,7 +314,7 @@ class SharedFactor:
         entries, own = rows.tocoo(), np.arange(height)
         value = np.concatenate([entries.data, np.zeros(height)])
         place = np.concatenate([entries.row, own]), np.concatenate([entries.col, start + own])
-        rows = sp.csr_matrix((value, place), shape=rows.shape)
+        rows = Csr((value, place), shape=rows.shape)
         csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data)
         shape = ((height, self.size), (height, self.size))
         self._matrix = PETSc.Mat().createAIJ(shape, csr=csr, comm=self._subset)

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
+from fenics_contact._base.csr import Csr
 from fenics_contact._fem.composition import Composition
 from fenics_contact._fem.deformed_forms import MEAN_FORMS
 from fenics_contact._fem.templates import (
@@ -179,7 +180,7 @@ class GaussPoints:
     def assembled(self, entries: np.ndarray) -> sp.csr_matrix:
         """Return the matrix with entries from `stiffness`; its pattern is the same whatever is zero in it."""
         indptr, indices, _ = self._pattern
-        return sp.csr_matrix((entries, indices, indptr), shape=(len(indptr) - 1,) * 2)
+        return Csr((entries, indices, indptr), shape=(len(indptr) - 1,) * 2)
 
     def with_others(self, entries: np.ndarray, others: sp.csr_matrix) -> np.ndarray:
         """Return entries from `stiffness` with those of another matrix on the same mesh."""
@@ -218,7 +219,7 @@ class GaussPoints:
 def assembled(form: _dolfinx.fem.Form, shape: tuple[int, int]) -> sp.csr_matrix:
     """Assemble a bilinear form on one rank."""
     indptr, indices, data = _dolfinx.assemble_csr(form)
-    return sp.csr_matrix((data, indices, indptr), shape=shape)
+    return Csr((data, indices, indptr), shape=shape)
 
 
 def mean_fields(mesh: _dolfinx.mesh.Mesh, element: Element) -> list[_dolfinx.fem.Function]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
 from fenics_contact._large_deformations.loading import Loading, UnsymmetricLowRank, with_added
@@ -76,7 +77,7 @@ class SymmetricLowRank:
     @classmethod
     def none(cls, size: int) -> SymmetricLowRank:
         """Return none on that many dofs."""
-        return cls(sp.csr_matrix((size, 0)), np.zeros(0), _NONE)
+        return cls(Csr((size, 0)), np.zeros(0), _NONE)
 
     def joined(self, other: SymmetricLowRank) -> SymmetricLowRank:
         """Return the sum of two, the columns of the other one last."""
@@ -118,7 +119,7 @@ class FollowerStiffness:
         corrections: RowCorrections,
     ) -> FollowerStiffness:
         """Return those of several stiffnesses; blocks with their nodes."""
-        nothing = sp.csr_matrix((normal.columns.shape[0], 0))
+        nothing = Csr((normal.columns.shape[0], 0))
         others = [each for each in others if each.left.shape[1]] or [
             UnsymmetricLowRank(nothing, nothing, _NONE)
         ]
@@ -136,7 +137,7 @@ class FollowerStiffness:
     @classmethod
     def of_loads(cls, size: int, others: Sequence[UnsymmetricLowRank]) -> FollowerStiffness:
         """Return that of loads alone on that many dofs."""
-        nothing = RowCorrections(sp.csr_matrix((size, 0)), _NONE, _NONE)
+        nothing = RowCorrections(Csr((size, 0)), _NONE, _NONE)
         return cls.of(SymmetricLowRank.none(size), (np.zeros((0, 0, 0)), _NONE), others, nothing)
 
     @property
@@ -273,7 +274,7 @@ def stiffened(
     dofs = dim * place[:, None] + np.arange(dim)
     row, column = np.repeat(dofs, dim, axis=1).ravel(), np.tile(dofs, dim).ravel()
     size = decomposition.torn_size
-    added = sp.csr_matrix((block.ravel(), (row, column)), shape=(size, size))
+    added = Csr((block.ravel(), (row, column)), shape=(size, size))
     return with_added(decomposition, tangents, added)
 
 

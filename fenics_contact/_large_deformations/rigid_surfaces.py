@@ -22,6 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import block_diag
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._scene.scene import Scene
@@ -320,7 +321,7 @@ def spring_columns(
 
     V of shape (size, m), with columns of length one; D, shape (m,), [force / length]; nodes, shape (m,).
     """
-    columns, values, nodes = [sp.csr_matrix((size, 0))], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
+    columns, values, nodes = [Csr((size, 0))], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
     for each in turned:
         sprung = np.flatnonzero(each.springs[each.free])
         if len(sprung):
@@ -380,4 +381,4 @@ def _on_rows(surface: TurnedSurface, fields: np.ndarray, size: int) -> sp.csr_ma
     dim = surface.surface.dim
     row = (dim * surface.nodes[:, None] + np.arange(dim)).ravel()
     entries = np.ones(len(row)), (row, np.arange(len(row)))
-    return sp.csr_matrix(entries, shape=(size, len(row))) @ sp.csr_matrix(fields)
+    return Csr(entries, shape=(size, len(row))) @ Csr(fields)

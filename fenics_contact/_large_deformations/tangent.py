@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI, PETSc
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact.errors import ConvergenceError
@@ -417,24 +418,24 @@ class TangentSystem(DualSystem):
         shared = comm.allgather({n: (each.stiffness, each.softened) for n, each in self.operators.items()})
         blocks = {number: block for part in shared for number, block in part.items()}
         stiffnesses = [blocks[number][0] for number in sorted(blocks)]
-        self.stiffness = sp.csr_matrix(sp.block_diag(stiffnesses))
+        self.stiffness = Csr(sp.block_diag(stiffnesses))
         self.softened = sum(count for _, count in blocks.values())
         offset = np.concatenate([[0], np.cumsum([len(block) for block in stiffnesses])])
         mine = offset[[part.mesh.number for part in self.torn.subdomains]]
         total, count = int(offset[-1]), self.torn.free.count
         motions = TornModes.of(self.torn.subdomains, mine, total)
-        self.points = sp.csr_matrix((count, total))
+        self.points = Csr((count, total))
         if count:  # free motions move nothing but the right sides of rows
             known = self.torn.free.stiffness
-            own = sp.csr_matrix((count, count)) if known is None else sp.csr_matrix(known)
+            own = Csr((count, count)) if known is None else Csr(known)
             self.points = sp.hstack([self.points, sp.identity(count)], format="csr")
-            self.stiffness = sp.csr_matrix(sp.block_diag([self.stiffness, own]))
+            self.stiffness = Csr(sp.block_diag([self.stiffness, own]))
             motions = motions.combined(sp.eye(total, total + count, format="csr"))
         return motions
 
     def _without_unheld(self, coarse: CoarseSpace) -> CoarseSpace:
         """Leave the motions as they are: under stress they may have a stiffness."""
-        self.unheld = sp.csr_matrix((self.kernel.shape[0], 0))
+        self.unheld = Csr((self.kernel.shape[0], 0))
         self._unheld_points = self.points[:, :0]
         return coarse
 
@@ -442,7 +443,7 @@ class TangentSystem(DualSystem):
         """Return a displacement on the rows of a neighbouring configuration made continuous. Collective."""
         rows, numbering = torn.B[:, self.inverse.interface].tocsr(), torn.numbering
         sewing = DirichletPreconditioner(self.inverse, rows, self._compliance(), numbering, torn.n_gluing)
-        nothing = sp.csr_matrix((len(torn.right), 0))
+        nothing = Csr((len(torn.right), 0))
         sewn = sewing.lifting(nothing).jump(torn.right - torn.jump(displacement))
         return displacement + self.inverse.extend(sewn)
 

@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns
 from fenics_contact._large_deformations.moving_contact import AuxiliaryRows
@@ -78,7 +79,7 @@ class TangentProblem:
         """Return columns of weights of rows, shape (n_owned, n), with those of the rows that correct them."""
         further = self.further
         entries = further.correction, (further.correction_rows, further.corrected_rows)
-        return (rows + sp.csr_matrix(entries, shape=(rows.shape[0],) * 2) @ rows).tocsr()
+        return (rows + Csr(entries, shape=(rows.shape[0],) * 2) @ rows).tocsr()
 
     def scaled(self) -> TangentProblem:
         """Return the problem in the multipliers of `DualProblem.scaling`, itself where there is none."""
@@ -130,8 +131,8 @@ class _StiffAlone:
         at, coarse = self.whole, self.whole.problem.coarse
         passed = (at.stiffness @ self.alone) @ self.flexibility @ self.alone.T
         onto = self.kept.T - self.kept.T @ passed
-        fewer = CoarseSpace(coarse.comm, sp.csr_matrix(onto) @ coarse.matrix, onto @ coarse.load)
-        stiffness = sp.csr_matrix(onto @ (at.stiffness @ self.kept))
+        fewer = CoarseSpace(coarse.comm, Csr(onto) @ coarse.matrix, onto @ coarse.load)
+        stiffness = Csr(onto @ (at.stiffness @ self.kept))
         return replace(at, problem=replace(at.problem, coarse=fewer), stiffness=stiffness, resisted=self)
 
     def motions(self, change: Vector, resisted: Vector) -> Vector:

@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.checks import floats
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.advice import Advice
@@ -93,7 +94,7 @@ class Slave:
         return ContactPoints.at_nodes(
             pair, self.nodes[chosen], weight, normal, gap, surface.point_areas[chosen],
             length=surface.sizes[chosen] if surface.measure.varies else None,
-            merged_nodes=sp.csr_matrix((len(chosen), self.n_pairs), dtype=np.int64),
+            merged_nodes=Csr((len(chosen), self.n_pairs), dtype=np.int64),
         )  # fmt: skip
 
 
@@ -231,7 +232,7 @@ class ObstacleMaster(Master):
 
     def _weights(self, places: np.ndarray) -> sp.csr_matrix:
         """Return the weights of the nodes of all bodies at places of the obstacle, (n, n_nodes)."""
-        return sp.csr_matrix((len(places), self.n_nodes))
+        return Csr((len(places), self.n_nodes))
 
     def cure_of_no_points(self, scene: Scene) -> str:
         """Return what to do where no slave node faces it."""
@@ -316,7 +317,7 @@ class ToolMaster(MovingMaster):
 def carried(weights: np.ndarray, nodes: np.ndarray, count: int) -> sp.csr_matrix:
     """Return weights of a few nodes, shape (n, k), as those of all of them, (n, count)."""
     rows = weights.shape[1] * np.arange(len(weights) + 1)
-    return sp.csr_matrix((weights.ravel(), np.tile(nodes, len(weights)), rows), shape=(len(weights), count))
+    return Csr((weights.ravel(), np.tile(nodes, len(weights)), rows), shape=(len(weights), count))
 
 
 @dataclass(frozen=True)
@@ -355,7 +356,7 @@ class BodyMaster(Master):
         distance[hit.point], outward[hit.point] = hit.gap, hit.normal
         own = node_weights(self.surface, hit).tocoo()
         entries = own.data, (hit.point[own.row], self.nodes[own.col])
-        return Met(distance, outward, sp.csr_matrix(entries, shape=(len(places), self.n_nodes)))
+        return Met(distance, outward, Csr(entries, shape=(len(places), self.n_nodes)))
 
     def turning(self, slave: FacetedSurface, place: np.ndarray, weights: sp.csr_matrix) -> np.ndarray:
         """Return what normals at nodes say."""
@@ -416,7 +417,7 @@ def _by_projection(slave: Slave, master: BodyMaster, search: Search) -> ContactP
         _tell_of_lost(slave.surface.points[candidates[hit.lost]], len(candidates))
     own = node_weights(surface, hit)
     entries = own.data, master.nodes[own.indices], own.indptr
-    weights = sp.csr_matrix(entries, shape=(own.shape[0], master.n_nodes))
+    weights = Csr(entries, shape=(own.shape[0], master.n_nodes))
     points = slave.points(candidates[hit.point], hit.normal, hit.gap, weights)
     search.advice.uneven_pressure(search.scene, master.pair, slave.surface, surface, comm)
     return replace(points, facet=hit.facet, local=hit.local)
@@ -442,7 +443,7 @@ def _by_mortar(slave: Slave, master: BodyMaster, search: Search) -> ContactPoint
     met = MortarPoints.of(slave.surface, master.surface, slave.bearing, share, search.comm, free)
     coupling, nodes = met.coupling, np.concatenate([slave.nodes, master.nodes])
     count = len(nodes)
-    spread = sp.csr_matrix((np.ones(count), (np.arange(count), nodes)), shape=(count, master.n_nodes))
+    spread = Csr((np.ones(count), (np.arange(count), nodes)), shape=(count, master.n_nodes))
     points = slave.points(coupling.node, coupling.normal, met.gap, (met.weight @ spread).tocsr())
     return replace(points, area=coupling.area)
 

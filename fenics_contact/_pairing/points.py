@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias, TypeVar
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import displayed
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
@@ -103,9 +104,9 @@ class ContactPoints:
         (count, dim), none, axes = normal.shape, np.full(len(slave), -1), reference_axes(normal)
         if "own" not in more:
             entries = np.ones(count), slave, np.arange(count + 1)
-            more["own"] = sp.csr_matrix(entries, shape=master.shape)
+            more["own"] = Csr(entries, shape=master.shape)
         if "merged_nodes" not in more:
-            more["merged_nodes"] = sp.csr_matrix((count, 0), dtype=np.int64)
+            more["merged_nodes"] = Csr((count, 0), dtype=np.int64)
         values: dict[str, Any] = {
             "tangents": tangent_frames(normal, axes), "facet": none, "local": np.zeros((count, dim - 1)),
             "axes": axes, "symmetric": np.zeros((count, dim), dtype=bool), "distance": gap,
@@ -252,7 +253,7 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
     """Concatenate the points of several pairs, turned ones if the first are; empty if there are no parts."""
     if not parts:
         integer, real = np.zeros(0, dtype=np.int64), np.zeros(0)
-        none = sp.csr_matrix((0, n_nodes))
+        none = Csr((0, n_nodes))
         return ContactPoints.at_nodes(integer, integer, none, np.zeros((0, dim)), real, real)
     if len(parts) == 1:
         return parts[0]
@@ -291,7 +292,7 @@ def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     jump = points.jump
-    squares = sp.csr_matrix((jump.data**2, jump.indices, jump.indptr), shape=jump.shape)
+    squares = Csr((jump.data**2, jump.indices, jump.indptr), shape=jump.shape)
     free, every = squares @ (~fixed).astype(float), squares @ np.ones(fixed.shape)
     return np.asarray((free > HELD**2 * every) & ~points.symmetric)
 
@@ -600,7 +601,7 @@ def merged_areas(
     kept, lost = kept[first], lost[first]
     area = np.bincount(kept, points.area[lost], points.count)
     entries = points.slave[lost] + 1, (kept, points.pair[lost])
-    return area, sp.csr_matrix(entries, shape=(points.count, len(scene.contacts)))
+    return area, Csr(entries, shape=(points.count, len(scene.contacts)))
 
 
 def are_beside(scene: Scene, pair: ContactPair, other: ContactPair) -> bool:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-import scipy.sparse as sp
+
+from fenics_contact._base.csr import Csr
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def powers_of(dim: int, order: int) -> list[tuple[int, ...]]:
 
 
 def _summed(centre: np.ndarray, count: int, values: np.ndarray) -> np.ndarray:
-    over = sp.csr_matrix((np.ones(len(centre)), (centre, np.arange(len(centre)))), shape=(count, len(centre)))
+    over = Csr((np.ones(len(centre)), (centre, np.arange(len(centre)))), shape=(count, len(centre)))
     return np.asarray(over @ values.reshape(len(centre), -1)).reshape(count, *values.shape[1:])
 
 

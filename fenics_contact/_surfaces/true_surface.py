@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._kinematics.measure import PLAIN, Measure
 from fenics_contact._surfaces.facets import (
     FacetedSurface,
@@ -190,7 +191,7 @@ def is_crease(
     nodes = surface.facets.ravel()[joints.corners[:, 0]]
     count, size = nodes.shape[0], len(surface.nodes)
     number = np.repeat(np.arange(count), nodes.shape[1])
-    at_node = sp.csr_matrix((np.ones(nodes.size), (nodes.ravel(), number)), shape=(size, count))
+    at_node = Csr((np.ones(nodes.size), (nodes.ravel(), number)), shape=(size, count))
     along = surface.points[nodes[:, -1]] - surface.points[nodes[:, 0]]
     along = along / np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
     rim = at_node.getnnz(axis=1) < np.bincount(surface.facets.ravel(), minlength=size)
@@ -199,7 +200,7 @@ def is_crease(
         beside = surface.facets[joints.facets[:, side]]
         apart = (beside[..., None] != nodes[:, None]).all(axis=-1)
         joint, corner = np.nonzero(apart)
-        across = sp.csr_matrix((np.ones(len(joint)), (joint, beside[joint, corner])), shape=(count, size))
+        across = Csr((np.ones(len(joint)), (joint, beside[joint, corner])), shape=(count, size))
         pairs = (across @ at_node).tocoo()
         alike = np.abs(np.einsum("nd,nd->n", along[pairs.row], along[pairs.col])) > parallel
         alike |= surface.dim == 2
@@ -302,7 +303,7 @@ def _fit_around(
 def rings_of(wedge: np.ndarray, count: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the wedges within a number of rings of facets around each, as pairs without itself."""
     facet = np.repeat(np.arange(len(wedge)), wedge.shape[1])
-    of_facet = sp.csr_matrix((np.ones(wedge.size), (wedge.ravel(), facet)), shape=(count, len(wedge)))
+    of_facet = Csr((np.ones(wedge.size), (wedge.ravel(), facet)), shape=(count, len(wedge)))
     ring = within = (of_facet @ of_facet.T).tocsr()
     for _ in range(rings - 1):
         within = within @ ring

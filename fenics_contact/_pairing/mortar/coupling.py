@@ -28,6 +28,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.mortar.cells import Cells, candidate_pairs, cells_of, overlaps_of
@@ -412,9 +413,9 @@ class Entries:
     def matrix(self) -> sparse.csr_matrix:
         """Return the sum."""
         if not self._parts:
-            return sparse.csr_matrix(self.shape)
+            return Csr(self.shape)
         values, row, column = (np.concatenate(part) for part in zip(*self._parts, strict=True))
-        return sparse.csr_matrix((values, (row, column)), shape=self.shape)
+        return Csr((values, (row, column)), shape=self.shape)
 
 
 def measured(cells: Cells, slave: FacetedSurface, facet: np.ndarray) -> Cells:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
@@ -502,7 +503,7 @@ def _normalised(
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Return the derivatives of M_ij / Σ_j M_ij and of Σ_j M_ij."""
     entries = np.ones(len(point)), (point, np.arange(len(point)))
-    over = sp.csr_matrix(entries, shape=(count, len(point)))
+    over = Csr(entries, shape=(count, len(point)))
     area, by_area = (over @ integral)[point], (over @ rows).tocsr()
     share = scaled_rows(by_area[point], integral / area)
     return scaled_rows((rows - share).tocsr(), 1.0 / area), by_area
@@ -521,7 +522,7 @@ def _summed(
     """Add entries with the same number."""
     key, place = np.unique(np.concatenate(keys), return_inverse=True)
     place = place.ravel()
-    add = sp.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(len(key), len(place)))
+    add = Csr((np.ones(len(place)), (place, np.arange(len(place)))), shape=(len(key), len(place)))
     return key, add @ np.concatenate(integrals), (add @ sp.vstack(rows, format="csr")).tocsr()
 
 
@@ -550,7 +551,7 @@ def _integrals(
                 continue
             parts.append(_of_facets(overlaps, planes, slave, chosen, master))
     if not parts:
-        return np.zeros(0, dtype=np.int64), np.zeros(0), sp.csr_matrix((0, width))
+        return np.zeros(0, dtype=np.int64), np.zeros(0), Csr((0, width))
     return _summed(*(list(column) for column in zip(*parts, strict=True)))
 
 
@@ -580,5 +581,5 @@ def _of_facets(
     kept = here[facet]
     entries = dense[used][kept], column.reshape(len(nodes), -1)[facet][kept]
     ends = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
-    rows = sp.csr_matrix((*entries, ends), shape=(len(facet), slave.dim * (n_slave + n_master)))
+    rows = Csr((*entries, ends), shape=(len(facet), slave.dim * (n_slave + n_master)))
     return key[used], (shared.functions @ moments)[used], rows

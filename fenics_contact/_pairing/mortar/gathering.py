@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
@@ -110,7 +111,7 @@ class CondensedDualBasis:
         place = np.searchsorted(points, np.flatnonzero(well)[shares.row])
         row, column = np.append(np.arange(count), place), np.append(points, hardly[shares.col])
         entries = np.append(np.ones(count), shares.data), (row, column)
-        part = sp.csr_matrix(entries, shape=(count, len(well)))
+        part = Csr(entries, shape=(count, len(well)))
         own = part @ sp.diags(whole.area)
         return cls(whole, points, part, scaled_rows(own, 1.0 / np.asarray(own.sum(axis=1)).ravel()))
 
@@ -139,7 +140,7 @@ class CondensedDualBasis:
         own, of_whole = self.own, self.whole.own
         if of_whole is not None:
             return (own @ of_whole).tocsr()
-        return sp.csr_matrix((own.data, self.whole.node[own.indices], own.indptr), (own.shape[0], n_nodes))
+        return Csr((own.data, self.whole.node[own.indices], own.indptr), (own.shape[0], n_nodes))
 
     def by_surfaces(
         self,
@@ -191,7 +192,7 @@ def _shared_facets(node: np.ndarray, slave: FacetedSurface) -> sp.csr_matrix:
     number[node] = np.arange(len(node))
     facet, corner = np.nonzero(number[slave.facets] >= 0)
     entries = np.ones(len(facet)), (facet, number[slave.facets][facet, corner])
-    of_facets = sp.csr_matrix(entries, shape=(len(slave.facets), len(node)))
+    of_facets = Csr(entries, shape=(len(slave.facets), len(node)))
     return (of_facets.T @ of_facets).tocsr()
 
 

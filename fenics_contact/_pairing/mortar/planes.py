@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy import sparse
 
+from fenics_contact._base.csr import Csc
 from fenics_contact._surfaces.facets import FacetedSurface, corner_products, shape_functions
 from fenics_contact.errors.kinds import FoldedFacetsError
 from fenics_contact.mesh.cell_types import CELL_TYPES, FACET_TYPES, quadrature
@@ -194,7 +194,7 @@ class SumsBy:
         self.groups, count = groups or int(number.max(initial=-1)) + 1, len(number)
         # By columns, of which each has one entry: there is nothing to sort.
         entries = np.ones(count), number, np.arange(count + 1)
-        self._matrix = sparse.csc_matrix(entries, shape=(self.groups, count))
+        self._matrix = Csc(entries, shape=(self.groups, count))
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """Return the sums of values, shape (n, ...), shape (groups, ...)."""

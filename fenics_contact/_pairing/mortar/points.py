@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
@@ -181,10 +182,10 @@ class MortarPoints:
         the node. Rows add up to one, shape (n, len(slave.nodes) + len(master.nodes)).
         """
         count, n_slave = len(self.coupling.node), len(self.slave.nodes)
-        lacking, own = sp.csr_matrix((count, n_slave)), self.coupling.own
+        lacking, own = Csr((count, n_slave)), self.coupling.own
         if own is not None:
             entries = np.ones(count), self.coupling.node, np.arange(count + 1)
-            lacking = sp.csr_matrix(entries, shape=lacking.shape) - own
+            lacking = Csr(entries, shape=lacking.shape) - own
             lacking.eliminate_zeros()
         return sp.hstack([lacking, self.coupling.weight], format="csr")
 

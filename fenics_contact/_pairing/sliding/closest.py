@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._pairing.sliding.patches import PatchValues, SmoothPatches, n_values
 from fenics_contact._surfaces.facets import FacetedSurface, corner_products, outside
 from fenics_contact._surfaces.projection import (
@@ -272,7 +273,7 @@ def summed_normals_by_points(surface: FacetedSurface, along: np.ndarray) -> sp.c
     column = np.concatenate([(dim * node[..., None] + np.arange(dim)).ravel() for node, _ in parts])
     value = np.concatenate([part.ravel() for _, part in parts])
     size = len(surface.nodes)
-    return sp.csr_matrix((value, (row, column)), shape=(size, dim * size))
+    return Csr((value, (row, column)), shape=(size, dim * size))
 
 
 #: What decides where ways between places that meet do not, along the axes of the surface: square to no side

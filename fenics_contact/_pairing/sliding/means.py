@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
@@ -56,7 +57,7 @@ class MeanMotion:
         away = coordinates[self.node] - coordinates[points.slave[self.point]]
         lever = np.einsum("md,md->m", away, along[self.point])
         entries = lever, (self.point, np.arange(len(lever)))
-        return (sp.csr_matrix(entries, shape=(points.count, len(lever))) @ self.weights).tocsr()
+        return (Csr(entries, shape=(points.count, len(lever))) @ self.weights).tocsr()
 
     def gap_rows(self, points: ContactPoints, coordinates: np.ndarray) -> sp.csr_matrix:
         """Return the derivative of the gaps less the rows n·(δx_i − Σ W_ij δx_j) of the forces, (n, n_dofs).
@@ -107,11 +108,11 @@ class MeanMotion:
         # One row for each component of each node, component by component.
         dim, every, component = force.shape[1], np.arange(len(self.node)), np.arange(force.shape[1])[:, None]
         entry = (len(node) * component + place.ravel()).ravel(), np.tile(every, dim)
-        acted = sp.csr_matrix((force[self.point].T.ravel(), entry), shape=(dim * len(node), len(every)))
+        acted = Csr((force[self.point].T.ravel(), entry), shape=(dim * len(node), len(every)))
         right.append(acted @ self.weights)
         column, row = (dim * node + component).ravel(), np.arange(dim * len(node) + 1)
         shape = dim * len(node), self.weights.shape[1]
-        left.append(sp.csr_matrix((-np.ones(len(column)), column, row), shape=shape))
+        left.append(Csr((-np.ones(len(column)), column, row), shape=shape))
         point = [np.tile(acting, change.shape[1]), np.tile(self.point[first], dim)]
         return LowRank(
             sp.vstack(left).T.tocsr(), sp.vstack(right).T.tocsr(), np.concatenate(point).astype(np.int64)
@@ -136,9 +137,9 @@ class MeanTangents:
     @classmethod
     def none(cls, count: int, width: int, size: int) -> MeanTangents:
         """Return those of points without forces."""
-        nothing = sp.csr_matrix((size, 0))
+        nothing = Csr((size, 0))
         stiffness = LowRank(nothing, nothing, np.zeros(0, dtype=np.int64))
-        return cls(stiffness, sp.csr_matrix((count, size)), sp.csr_matrix((count * width, size)))
+        return cls(stiffness, Csr((count, size)), Csr((count * width, size)))
 
     def with_points(self, mine: np.ndarray, other: MeanTangents) -> MeanTangents:
         """Return these and those of some of the points, by their numbers among all."""
@@ -160,7 +161,7 @@ class MeanTangents:
 def placed(chosen: np.ndarray, count: int) -> sp.csr_matrix:
     """Return the matrix that puts rows to chosen places among a number of rows."""
     entries = np.ones(len(chosen)), (chosen, np.arange(len(chosen)))
-    return sp.csr_matrix(entries, shape=(count, len(chosen)))
+    return Csr(entries, shape=(count, len(chosen)))
 
 
 def interleaved(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
@@ -212,12 +213,12 @@ class MovingMeans:
         weight, own = self.coupling.weight, self.coupling.own
         entries = weight.data, self.master_nodes[weight.indices], weight.indptr
         shape = (weight.shape[0], n_nodes)
-        weights = sp.csr_matrix(entries, shape=shape)
+        weights = Csr(entries, shape=shape)
         if own is None:
             return weights
         node, number = self.slave_nodes[self.coupling.node], np.arange(len(self.coupling.node) + 1)
-        alone = sp.csr_matrix((np.ones(len(node)), node, number), shape=shape)
-        return weights + alone - sp.csr_matrix((own.data, self.slave_nodes[own.indices], own.indptr), shape)
+        alone = Csr((np.ones(len(node)), node, number), shape=shape)
+        return weights + alone - Csr((own.data, self.slave_nodes[own.indices], own.indptr), shape)
 
     def symmetric(self) -> np.ndarray:
         """Return the planes of symmetry that cut both surfaces at points, shape (n, n_planes)."""
@@ -277,7 +278,7 @@ class MovingMeans:
 
         def among_all(rows: sp.csr_matrix) -> sp.csr_matrix:
             """Return rows by the dofs of both surfaces as rows by those of all bodies."""
-            whole = sp.csr_matrix((rows.data, dof[rows.indices], rows.indptr), shape=(rows.shape[0], size))
+            whole = Csr((rows.data, dof[rows.indices], rows.indptr), shape=(rows.shape[0], size))
             whole.sum_duplicates()  # of nodes on both surfaces, and sorted
             return whole
 
@@ -307,7 +308,7 @@ class MovingMeans:
         everywhere = np.zeros_like(slave.points)
         everywhere[node] = vectors
         own = summed_normals_by_points(slave, everywhere)[node]
-        rows = sp.csr_matrix((own.data, own.indices, own.indptr), shape=(len(node), weights.rows.shape[1]))
+        rows = Csr((own.data, own.indices, own.indptr), shape=(len(node), weights.rows.shape[1]))
         if not len(of_master.point):
             return rows
         turned = self._turned_by_master(of_master, by_all, weights)
@@ -328,7 +329,7 @@ class MovingMeans:
         mine = np.flatnonzero((place[weights.point] >= 0) & (weights.node < len(master.nodes)))
         row, node = place[weights.point[mine]], weights.node[mine]
         lever = np.einsum("md,md->m", along[row], master.normals[node])
-        result = sp.csr_matrix((lever, (row, mine)), shape=(count, weights.rows.shape[0])) @ weights.rows
+        result = Csr((lever, (row, mine)), shape=(count, weights.rows.shape[0])) @ weights.rows
         by_area = np.einsum("nd,nd->n", by_all, chosen.by_area)
         result = result + scaled_rows(weights.area[chosen.point], by_area)
         weight = self.coupling.weight[chosen.point]
@@ -343,7 +344,7 @@ class MovingMeans:
             own = weight @ summed_normals_by_points(near, vectors)
             own = scaled_rows(own.tocsr(), along[:, component])
             first = size - own.shape[1]  # the nodes of the slave come first
-            result = result + sp.csr_matrix((own.data, own.indices + first, own.indptr), shape=(count, size))
+            result = result + Csr((own.data, own.indices + first, own.indptr), shape=(count, size))
         return result.tocsr()
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeAlias
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.inside import ON_PLANE, InFacets, InsideOf
 from fenics_contact._pairing.masters import Placements
@@ -139,7 +140,7 @@ class Candidates:
         if (facet < 0).all():
             return points
         own = self.own[chosen]
-        own = sp.csr_matrix((own.data, self.slave_nodes[own.indices], own.indptr), shape=weights.shape)
+        own = Csr((own.data, self.slave_nodes[own.indices], own.indptr), shape=weights.shape)
         return replace(points, own=own, slave_facet=facet[chosen], slave_local=self.on_local[chosen])
 
     def joined_to(self, lost: np.ndarray, kept: np.ndarray) -> Self:
@@ -152,7 +153,7 @@ class Candidates:
         area = self.area.copy()
         np.add.at(area, place, self.area[there])
         entries = self.nodes[there] + 1, (place, np.full(len(place), self.number))
-        merged_nodes = self.merged_nodes.maximum(sp.csr_matrix(entries, shape=self.merged_nodes.shape))
+        merged_nodes = self.merged_nodes.maximum(Csr(entries, shape=self.merged_nodes.shape))
         return replace(self, area=area, merged_nodes=merged_nodes).part(
             np.setdiff1d(np.arange(len(area)), there)
         )
@@ -268,6 +269,6 @@ def _split(kept: SlidingPair, lost: SlidingPair, beside: bool) -> tuple[SlidingP
         area = kept.area.copy()
         area[here] += lost.area[there]
         entries = lost.nodes[there] + 1, (here, np.full(len(here), lost.number))
-        merged_nodes = kept.merged_nodes + sp.csr_matrix(entries, shape=kept.merged_nodes.shape)
+        merged_nodes = kept.merged_nodes + Csr(entries, shape=kept.merged_nodes.shape)
         kept = replace(kept, area=area, merged_nodes=merged_nodes.tocsr())
     return kept, lost.part(stays)

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
@@ -249,7 +250,7 @@ class SlidingPoints:
         moment = np.asarray(of_rows @ products.reshape(len(row), dim * dim)).reshape(count, dim, dim)
         slope = np.einsum("nde,ne->nd", np.linalg.pinv(moment, rcond=flat, hermitian=True), way)
         values = met.data * np.einsum("jd,jd->j", arm, slope[row])
-        return sp.csr_matrix((values, met.indices, met.indptr), shape=met.shape)
+        return Csr((values, met.indices, met.indptr), shape=met.shape)
 
     def stored(self, start: MaterialPoints) -> dict[str, np.ndarray]:
         """Return the arrays from which `SlidingContact.found_again` finds the same points."""
@@ -284,7 +285,7 @@ class SlidingPoints:
             chosen[mine] = False
         points, width = self.points, self.points.normal.shape[1] - 1
         if not chosen.any():
-            return sp.csr_matrix((points.count * width, self.coordinates.size))
+            return Csr((points.count * width, self.coordinates.size))
         rows = interleaved([spread(points.tangents[:, c], points.jump) for c in range(width)])
         return scaled_rows((self.slip_rows(start) - rows).tocsr(), np.repeat(chosen, width).astype(float))
 
@@ -401,4 +402,4 @@ def _entries_by_row(matrix: sp.csr_matrix) -> tuple[np.ndarray, sp.csr_matrix]:
     """Return the row of each entry, and the matrix that sums values of entries by row, weighted by them."""
     row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
     each = np.arange(len(row))
-    return row, sp.csr_matrix((matrix.data, each, matrix.indptr), shape=(matrix.shape[0], len(row)))
+    return row, Csr((matrix.data, each, matrix.indptr), shape=(matrix.shape[0], len(row)))

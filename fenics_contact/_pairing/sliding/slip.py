@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._pairing.sliding.stiffness import Differential, point_motion, spread
 
@@ -75,7 +76,7 @@ class MaterialPoints:
     def none(cls, n_nodes: int, dim: int) -> MaterialPoints:
         """Return none, with the number of nodes of all bodies."""
         nothing = np.zeros(0, dtype=np.int64)
-        return cls(nothing, nothing, sp.csr_matrix((0, n_nodes)), np.zeros((0, dim)))
+        return cls(nothing, nothing, Csr((0, n_nodes)), np.zeros((0, dim)))
 
     def extended(self, other: MaterialPoints) -> MaterialPoints:
         """Return these points and those of another set that are not among them.
@@ -106,7 +107,7 @@ class MaterialPoints:
         row, column, value = stored["stood.weights"]
         key, pair, place = (stored[f"stood.{name}"] for name in ("key", "pair", "place"))
         at = row.astype(np.int64), column.astype(np.int64)
-        return cls(key, pair, sp.csr_matrix((value, at), shape=(len(key), n_nodes)), place)
+        return cls(key, pair, Csr((value, at), shape=(len(key), n_nodes)), place)
 
     def part(self, chosen: np.ndarray) -> MaterialPoints:
         """Return some of the points, by indices or a mask."""
@@ -135,7 +136,7 @@ def slip_by_start(
     count, nodes = points.count, len(coordinates)
     width, dim = points.tangents.shape[1:]
     local, slaves = point_motion(start, differential).local, start.own
-    result = sp.csr_matrix((width * count, dim * nodes))
+    result = Csr((width * count, dim * nodes))
     for index, rotation in turned.items():
         now, then = (each[points.pair[common[0]] == index] for each in common)
         rigid = bool(np.any(start.facet[then] < 0))
@@ -145,7 +146,7 @@ def slip_by_start(
                 foot = rotation @ _foot_by_node(start, differential, then)
                 rows = spread(-np.einsum("nd,nde->ne", tangent, foot), slaves[then])
             else:
-                rows = sp.csr_matrix((len(now), dim * nodes))
+                rows = Csr((len(now), dim * nodes))
                 for b in range(width):
                     rate = np.einsum("nd,nd->n", tangent, differential.slopes[b][then] @ coordinates)
                     rows = rows - sp.diags(rate) @ local[b][then]
@@ -172,7 +173,7 @@ def slip_by_start_of_means(
     now[common[1]] = common[0]
     now, some = now[mine], every.part(mine)
     motion, met = means.motion(some, now >= 0), np.flatnonzero(now >= 0)
-    result = sp.csr_matrix((width * count, dim * len(coordinates)))
+    result = Csr((width * count, dim * len(coordinates)))
     for a in range(width):
         along = np.zeros((len(mine), dim))
         along[met] = points.tangents[now[met], a]
@@ -190,4 +191,4 @@ def _foot_by_node(start: ContactPoints, differential: Differential, chosen: np.n
 
 def _of_nodes(chosen: np.ndarray, count: int) -> sp.csr_matrix:
     """Return the matrix that picks some of ``count`` entries."""
-    return sp.csr_matrix((np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), shape=(len(chosen), count))
+    return Csr((np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), shape=(len(chosen), count))

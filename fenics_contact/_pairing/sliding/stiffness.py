@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.sparse import LAST_PLACES, scaled_rows
 from fenics_contact._pairing.points import ContactPoints
 
@@ -36,7 +37,7 @@ def without_patches(curvature: np.ndarray, n_nodes: int) -> Differential:
     `curvature`: second derivatives of the distance of rigid obstacles, shape (n, dim, dim), [1 / length].
     """
     count, dim, _ = curvature.shape
-    none = (sp.csr_matrix((count, n_nodes)),) * (dim - 1)
+    none = (Csr((count, n_nodes)),) * (dim - 1)
     return Differential(np.zeros((count, dim - 1, dim)), np.zeros((count, dim - 1, dim - 1)), none, curvature)
 
 
@@ -62,7 +63,7 @@ def spread(vectors: np.ndarray, weights: sp.csr_matrix) -> sp.csr_matrix:
     row = np.repeat(np.arange(count), np.diff(weights.indptr))
     data = (weights.data[:, None] * vectors[row]).ravel()
     indices = (dim * weights.indices[:, None] + np.arange(dim)).ravel()
-    return sp.csr_matrix((data, indices, dim * weights.indptr), shape=(count, dim * weights.shape[1]))
+    return Csr((data, indices, dim * weights.indptr), shape=(count, dim * weights.shape[1]))
 
 
 def inverse_metrics(points: ContactPoints, differential: Differential) -> tuple[np.ndarray, np.ndarray]:
@@ -169,7 +170,7 @@ class GeometricStiffness:
         dim, size = self.blocks.shape[1], self.columns.shape[0]
         dof = dim * self.block_node[:, None] + np.arange(dim)
         row, column = np.repeat(dof, dim, axis=1).ravel(), np.tile(dof, dim).ravel()
-        own = sp.csr_matrix((self.blocks.ravel(), (row, column)), shape=(size, size))
+        own = Csr((self.blocks.ravel(), (row, column)), shape=(size, size))
         return (self.columns @ sp.diags(self.values) @ self.columns.T + own).tocsr()
 
 
@@ -209,7 +210,7 @@ def geometric_stiffness(
         others[pushed[between]] = 0.0
         return geometric_stiffness(points, differential, others).joined(own)
     if len(pressed) == 0:
-        nothing = sp.csr_matrix((points.normal.shape[1] * points.jump.shape[1], 0))
+        nothing = Csr((points.normal.shape[1] * points.jump.shape[1], 0))
         return GeometricStiffness(nothing, np.zeros(0), pressed, blocks, points.slave[pushed])
     core, gram = _core(points, differential, multiplier, pressed)
     lower = np.linalg.cholesky(gram)
@@ -273,7 +274,7 @@ def friction_stiffness(points: ContactPoints, differential: Differential, fricti
     rubbed, jump = np.flatnonzero(friction.any(axis=1)), points.jump
     if not (differential.tangents[rubbed].any() or differential.curvature[rubbed].any()):
         # Means over facets move, too, but not as closest points do.
-        nothing = sp.csr_matrix((jump.shape[1] * points.normal.shape[1], 0))
+        nothing = Csr((jump.shape[1] * points.normal.shape[1], 0))
         return LowRank(nothing, nothing, rubbed[:0])
     motion = point_motion(points, differential)
     turned = frame_changes(points.normal, points.axes, motion.directions)

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._pairing.masters import BodyMaster
 from fenics_contact._pairing.points import ContactPoints, with_symmetry
 from fenics_contact._pairing.sliding.closest import ClosestPoints, Roles, patch_points
@@ -85,7 +86,7 @@ class OnPatches(OnSurface):
         hit = self.closest(moved, known, met)
         own, width = coordinates[self.master.nodes], len(self.master.nodes)
         at = patch_points(patches, patches.coefficients(own)[hit.facet], hit.local)
-        spread = sp.csr_matrix((np.ones(width), (np.arange(width), self.master.nodes)), (width, count))
+        spread = Csr((np.ones(width), (np.arange(width), self.master.nodes)), (width, count))
         weights, *slopes = (
             (patches.weights(hit.facet, values) @ spread).tocsr()
             for values in (at.functions.value, *np.moveaxis(at.functions.first, 2, 0))
@@ -176,10 +177,10 @@ class OnOwnBody(OnPatches):
         normals = side.slave.normals[side.candidates[row]]
         behind = np.einsum("nd,nd->n", centres[column] - place[row], normals) < 0.0
         shape = len(place), len(centres)
-        behind_it = sp.csr_matrix((np.ones(behind.sum()), (row[behind], column[behind])), shape=shape)
+        behind_it = Csr((np.ones(behind.sum()), (row[behind], column[behind])), shape=shape)
         carried = whole.patches.control.tocoo()
         facet = carried.row // (whole.patches.control.shape[0] // len(centres))
-        own = sp.csr_matrix(
+        own = Csr(
             (np.ones(len(facet)), (facet, master.nodes[carried.col])),
             shape=(len(centres), int(max(side.slave_nodes.max(), master.nodes.max())) + 1),
         )
