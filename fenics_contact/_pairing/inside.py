@@ -15,6 +15,7 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._pairing.following import followed_nodes
 from fenics_contact._pairing.masters import Master, Placements, master_of
 from fenics_contact._pairing.points import (
@@ -240,7 +241,7 @@ class InsideOf:
             place += heights(slave, facet, local).value[:, None] * normal
         row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
         entries = weights.ravel(), (row, self.nodes[nodes].ravel())
-        own = sp.csr_matrix(entries, shape=(len(nodes), len(self.scene.points)))
+        own = Csr(entries, shape=(len(nodes), len(self.scene.points)))
         met = self.master.met(place, normal)
         return PointsInside(met.distance, met.normal, self._following(own), self._following(met.weights))
 
@@ -256,7 +257,7 @@ class InsideOf:
         slave = self.slave
         rows = slave.corners * np.arange(len(slave.facets) + 1)
         entries = np.ones(slave.facets.size), slave.facets.ravel(), rows
-        has = sp.csr_matrix(entries, shape=(len(slave.facets), len(slave.nodes)))
+        has = Csr(entries, shape=(len(slave.facets), len(slave.nodes)))
         around = ((has[facet] @ has.T @ has) > 0).astype(float)
         around = (around - around.multiply(has[facet])).tocsr()
         around.eliminate_zeros()

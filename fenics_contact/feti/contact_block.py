@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.costs import count_flops, count_messages
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact.errors import together
@@ -119,10 +120,10 @@ class ContactBlock:
         holder = _Holder.of(numbering, n_gluing)
         parts = holder.joined(share.data, place[share.row], place[share.col])
         if not parts:
-            return cls(holder, sp.csr_matrix((0, 0)), np.zeros(0, dtype=bool))
+            return cls(holder, Csr((0, 0)), np.zeros(0, dtype=bool))
         value, row, column = (np.concatenate(part) for part in zip(*parts, strict=True))
         count = numbering.total - n_gluing
-        gram = sp.csr_matrix((value, (row, column)), shape=(count, count))
+        gram = Csr((value, (row, column)), shape=(count, count))
         return cls(holder, gram, np.zeros(count, dtype=bool))
 
     def on_face(self, restriction: sp.csr_matrix) -> ContactBlock:
@@ -130,12 +131,12 @@ class ContactBlock:
         mine = restriction[self._holder.owned].tocoo()
         _, column = np.unique(mine.col, return_inverse=True)
         parts = self._holder.joined(self._holder.place[mine.row], column.ravel(), mine.data)
-        basis = sp.csr_matrix((0, 0))
+        basis = Csr((0, 0))
         if parts:
             starts = np.cumsum([0] + [part[1].max(initial=-1) + 1 for part in parts])
             row, value = (np.concatenate([part[k] for part in parts]) for k in (0, 2))
             where = np.concatenate([part[1] + start for part, start in zip(parts, starts, strict=False)])
-            basis = sp.csr_matrix((value, (row, where)), shape=(self._gram.shape[0], int(starts[-1])))
+            basis = Csr((value, (row, where)), shape=(self._gram.shape[0], int(starts[-1])))
         return _BlockOfFace(self._holder, self._gram, self._soft, basis)
 
     def softened(self, compliance: np.ndarray) -> ContactBlock:

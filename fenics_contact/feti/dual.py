@@ -11,6 +11,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from fenics_contact._base.costs import count_flops
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.memory import return_memory
 from fenics_contact._base.progress import PhaseTimer
@@ -258,7 +259,7 @@ class DualSystem:
         place = np.zeros(torn.B.shape[1], dtype=torn.B.indices.dtype)
         place[self.inverse.interface] = np.arange(len(self.inverse.interface))
         entries = torn.B.data, place[torn.B.indices], torn.B.indptr  # values share their memory
-        self._B_interface = sp.csr_matrix(entries, shape=(torn.B.shape[0], len(self.inverse.interface)))
+        self._B_interface = Csr(entries, shape=(torn.B.shape[0], len(self.inverse.interface)))
         self._Bt_interface = self._B_interface.T
         with timer.phase("coarse space"):
             self.kernel = self._kernel(comm)
@@ -402,7 +403,7 @@ class DualSystem:
         Returns:
             Shape (n_interface,), [length].
         """
-        nothing = sp.csr_matrix((len(residual), 0))
+        nothing = Csr((len(residual), 0))
         if self.torn.free.count:  # rigid surfaces move as the nodes on them do on average
             residual = residual + self.torn.free.columns @ self.torn.free_motion(residual)
         return self.preconditioner.lifting(nothing).jump(residual)
@@ -426,10 +427,10 @@ class DualSystem:
         offset = np.concatenate([[0], np.cumsum(comm.allreduce(counts))])
         mine = offset[[subdomain.mesh.number for subdomain in self.torn.subdomains]]
         own, count = TornModes.of(self.torn.subdomains, mine, int(offset[-1])), self.torn.free.count
-        whole, self.points = whole_motions(self.torn, offset), sp.csr_matrix((count, own.shape[1]))
+        whole, self.points = whole_motions(self.torn, offset), Csr((count, own.shape[1]))
         if count:  # the motions of points move nothing but the right sides of rows
             self.points = sp.hstack([self.points, sp.identity(count)], format="csr")
-            whole = sp.hstack([whole, sp.csr_matrix((whole.shape[0], count))], format="csr")
+            whole = sp.hstack([whole, Csr((whole.shape[0], count))], format="csr")
         return own.combined(whole)
 
     def _without_unheld(self, coarse: CoarseSpace) -> CoarseSpace:
@@ -443,7 +444,7 @@ class DualSystem:
         # Each in terms of its own mode: then motions of bodies that are not connected share no entries.
         unfelt = unfelt @ np.linalg.inv(unfelt[order[:k]])
         unfelt[np.abs(unfelt) <= ROUNDING * np.abs(unfelt).max(initial=0.0)] = 0.0
-        self.unheld = self.kernel.combined(sp.csr_matrix(unfelt)).tocsr()
+        self.unheld = self.kernel.combined(Csr(unfelt)).tocsr()
         self._unheld_points = self.points @ unfelt
         if k == 0:
             return coarse

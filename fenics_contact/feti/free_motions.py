@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.pairs import ContactPair
@@ -49,7 +50,7 @@ class FreeMotions:
     def on_rows(self, groups: RowGroups, fixed: np.ndarray, owned: np.ndarray) -> FreeMotions:
         """Return those on nodes on the owned rows of a system."""
         if self.count == 0:
-            return replace(self, columns=sp.csr_matrix((len(owned), 0)))
+            return replace(self, columns=Csr((len(owned), 0)))
         return replace(self, columns=without_held(groups.columns(self.columns), groups, fixed)[owned])
 
     def with_unknowns(self, own: Unknowns, owned: np.ndarray) -> FreeMotions:
@@ -65,10 +66,10 @@ class FreeMotions:
         if self.nodes is None:
             return replace(self, columns=columns)
         later = (groups.normal, groups.slips, *groups.further)
-        parts = [sp.csr_matrix((groups.n_equality, self.nodes.shape[1]))]
+        parts = [Csr((groups.n_equality, self.nodes.shape[1]))]
         parts += [each.columns(self.nodes) for each in later]
         rows, count = sp.vstack(parts, format="csr")[owned], self.tracked
-        more = sp.hstack([rows[:, :count], sp.csr_matrix((len(owned), self.count - count))])
+        more = sp.hstack([rows[:, :count], Csr((len(owned), self.count - count))])
         dyads = (kept @ self.dyads + rows[:, count:]).tocsr()
         return replace(self, columns=(columns + more).tocsr(), dyads=dyads)
 
@@ -125,10 +126,10 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
         row = tearing.global_nodes(surface.body, own)[node] * scene.components + component
         place = np.broadcast_to(np.arange(basis.shape[1]), basis.shape)
         entries = (basis.ravel(), (np.repeat(row, basis.shape[1]), place.ravel()))
-        columns.append(sp.csr_matrix(entries, shape=(size, basis.shape[1])))
+        columns.append(Csr(entries, shape=(size, basis.shape[1])))
         loads.append(load)
     if not columns:
-        return FreeMotions(sp.csr_matrix((size, 0)), np.zeros(0))
+        return FreeMotions(Csr((size, 0)), np.zeros(0))
     joined = sp.hstack(columns, format="csr")
     _require_flexible_slaves(scene, tearing, _moving(joined, (tearing.n_nodes, scene.components)))
     return FreeMotions(joined, np.concatenate(loads))

@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact.errors import together
 from fenics_contact.feti.subdomain import Subdomain, kernel_of_body
 from fenics_contact.feti.torn import TornSystem
@@ -37,7 +38,7 @@ class TornModes:
         modes = [start + np.arange(part.shape[1]) for part, start in zip(parts, first, strict=True)]
         columns = np.concatenate(modes)
         entries = np.ones(len(columns)), (np.arange(len(columns)), columns)
-        return cls(parts, sp.csr_matrix(entries, shape=(len(columns), total)))
+        return cls(parts, Csr(entries, shape=(len(columns), total)))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -66,7 +67,7 @@ class TornModes:
             for part, start, (a, b) in zip(self.parts, starts[:-1], pairwise(ends), strict=True)
         ]
         place = np.searchsorted(used, rows.indices)
-        rows = sp.csr_matrix((rows.data, place, rows.indptr), shape=(rows.shape[0], len(used)))
+        rows = Csr((rows.data, place, rows.indptr), shape=(rows.shape[0], len(used)))
         sizes, widths = np.array([part.shape for part in parts]).T
         first = np.repeat(np.cumsum(widths) - widths, sizes)
         counts = np.repeat(widths, sizes)
@@ -74,7 +75,7 @@ class TornModes:
         column = np.arange(start[-1], dtype=np.int32)
         column -= np.repeat((start[:-1] - first).astype(np.int32), counts)
         values = np.concatenate([part.ravel() for part in parts])
-        modes = sp.csr_matrix((values, column, start), shape=(len(counts), widths.sum()))
+        modes = Csr((values, column, start), shape=(len(counts), widths.sum()))
         modes.eliminate_zeros()  # half of the entries of rigid motions
         return (rows @ modes) @ self.coefficients
 
@@ -85,7 +86,7 @@ class TornModes:
     def tocsr(self) -> sp.csr_matrix:
         """Return R as a sparse matrix, shape (torn_size, n_modes)."""
         if self.shape[1] == 0:
-            return sp.csr_matrix(self.shape)
+            return Csr(self.shape)
         return self.moved_by(sp.identity(self.shape[0], format="csr"))
 
     @property
@@ -125,7 +126,7 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
         values.append(block.ravel())
     nowhere = np.zeros(0, dtype=np.int64)
     entries = (np.concatenate([nowhere, *rows]), np.concatenate([nowhere, *columns]))
-    motions = sp.csr_matrix((np.concatenate([np.zeros(0), *values]), entries), shape=(total, total))
+    motions = Csr((np.concatenate([np.zeros(0), *values]), entries), shape=(total, total))
     return (motions + sp.diags(unchanged)).tocsr()
 
 

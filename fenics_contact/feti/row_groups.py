@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact.feti.decomposition import Decomposition, GluingRows, Rows, Tearing
 
 if TYPE_CHECKING:
@@ -81,13 +82,13 @@ class RowGroup(ABC):
 
     def unknowns(self, scene: Scene) -> Unknowns:
         """Return the unknowns that the group has of its own."""
-        return Unknowns(sp.csr_matrix((self.count, 0)), np.zeros(0))
+        return Unknowns(Csr((self.count, 0)), np.zeros(0))
 
 
 def columns_of(group: RowGroup, fields: sp.csr_matrix, components: int) -> sp.csr_matrix:
     """Return the columns of a group one by one, as supports drive it along each field."""
     moved = [group.driven(each.toarray().reshape(-1, components)) for each in fields.T] if group.count else []
-    return sp.csr_matrix(np.array(moved).reshape(fields.shape[1], group.count).T)
+    return Csr(np.array(moved).reshape(fields.shape[1], group.count).T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +183,7 @@ class Joint(RowGroup):
 
     def released(self, scene: Scene) -> tuple[sp.csr_matrix, np.ndarray]:
         """Return orthonormal directions among those unit forces that are known, (n, k), and their sizes."""
-        return sp.csr_matrix((0, 0)), np.zeros(0)
+        return Csr((0, 0)), np.zeros(0)
 
     def require_resisted(self, scene: Scene, moved: np.ndarray, least: float) -> None:
         """Reject released forces against which nothing acts: motions along them, (k,), beyond the least."""

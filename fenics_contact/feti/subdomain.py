@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import displayed
 from fenics_contact._fem.composition import Composition, composition
 from fenics_contact._fem.forms import FormLibrary
@@ -492,7 +493,7 @@ def _with_stiffness(
     def stiffness() -> sp.csr_matrix:
         _dolfinx.update_coordinates(space.mesh, by_input_node)
         indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(parts, element, space))
-        elastic = mesh.matrix_of(sp.csr_matrix((data, indices, indptr)))
+        elastic = mesh.matrix_of(Csr((data, indices, indptr)))
         whole = (elastic + bed).tocsr() if bed.nnz else elastic
         return mesh.following.stiffness(body.sprung(whole, points))
 
@@ -527,7 +528,7 @@ def foundation_of(mesh: SubdomainMesh, body: Body, foundations: Sequence[Elastic
     """Return the stiffness of the foundations under a subdomain, shape (size, size)."""
     beds = [each for each in foundations if each.body == mesh.body]
     if not beds:
-        return sp.csr_matrix((mesh.size, mesh.size))
+        return Csr((mesh.size, mesh.size))
     dofs = (mesh.components * mesh.nodes[:, None] + np.arange(mesh.components)).ravel()
     return foundation_stiffness(beds, body, mesh.cells)[dofs][:, dofs].tocsr()
 

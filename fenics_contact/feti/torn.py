@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.checks import naming_arguments
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import displayed
 from fenics_contact._base.shared import once_a_machine
 from fenics_contact._fem.loads import as_tractions
@@ -550,7 +551,7 @@ def on_contact_rows(
     owned, before = rows.numbering.owned, torn.numbering.owned
     # Each rank owns the same rows of equality.
     equality, kept = (np.flatnonzero(each < torn.n_equality) for each in (owned, before))
-    picked = sp.csr_matrix((np.ones(len(kept)), (equality, kept)), shape=(len(owned), len(before)))
+    picked = Csr((np.ones(len(kept)), (equality, kept)), shape=(len(owned), len(before)))
     right = np.zeros(groups.total)
     right[groups.rows_of(groups.normal)] = points.gap
     right = right[owned]
@@ -584,5 +585,5 @@ def _numbered(groups: RowGroups, decomposition: Decomposition, known: DualNumber
     if comm.allreduce(int(not stays)) or known is None:
         known = DualNumbering(comm, owner, touched)
     shape = (len(known.local_rows), decomposition.torn_size)
-    B = sp.csr_matrix((value[here], (known.local_index(row), column)), shape=shape)
+    B = Csr((value[here], (known.local_index(row), column)), shape=shape)
     return NumberedRows(groups, known, B)

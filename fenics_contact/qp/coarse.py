@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from fenics_contact._base.costs import count_flops
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import SHIFT, SharedFactor
 from fenics_contact.errors import InvalidInputError
@@ -205,7 +206,7 @@ class Composed:
     def from_column(self, first: int) -> sp.csr_matrix:
         """Return the columns from one on as a matrix."""
         left, right = self.factors
-        return sp.csr_matrix(left @ right[:, first:])
+        return Csr(left @ right[:, first:])
 
 
 class NoElimination:
@@ -245,7 +246,7 @@ class CoarseSpace:
         matrices of faces beyond `DENSE_LIMIT`.
         """
         self.comm = comm
-        self.matrix: Any = G if isinstance(G, Composed) else sp.csr_matrix(G, dtype=np.float64)
+        self.matrix: Any = G if isinstance(G, Composed) else Csr(G, dtype=np.float64)
         self.load = np.asarray(e, dtype=np.float64)
         if self.load.shape != (self.matrix.shape[0],):
             raise InvalidInputError(f"e must have {self.matrix.shape[0]} entries as G, got {self.load.shape}")
@@ -364,8 +365,8 @@ class CoarseSpace:
     def columns(self, Z: sp.spmatrix | sp.sparray, *, whole: bool = False) -> sp.csr_matrix | Composed:
         """Return G Z of a face, as a matrix where it is not reduced; see `restricted`. Collective."""
         if not whole or self.faces is None:
-            return sp.csr_matrix(self.matrix @ Z)
-        return Composed((self.matrix, sp.csr_matrix(Z)))
+            return Csr(self.matrix @ Z)
+        return Composed((self.matrix, Csr(Z)))
 
 
 def gram_matrix(comm: MPI.Comm, columns: sp.csr_matrix) -> Gram:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
@@ -260,7 +261,7 @@ class Face:
         rows = layout.tangential[growing]
         values = rate[growing, None] * self.direction[growing]
         columns = np.broadcast_to(column[growing, None], rows.shape)
-        return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=self.restriction.shape)
+        return Csr((values.ravel(), (rows.ravel(), columns.ravel())), shape=self.restriction.shape)
 
     def counts(self, comm: MPI.Comm) -> tuple[int, int, int]:
         """Count closed contacts, sticking and slipping discs of all ranks. Collective."""
@@ -302,7 +303,7 @@ def face_basis(
     rows = np.concatenate([single, pairs.ravel()])
     columns = np.concatenate([np.arange(len(single)), np.repeat(len(single) + np.arange(len(across)), 2)])
     values = np.concatenate([np.ones(len(single)), tangents.ravel()])
-    return sp.csr_matrix((values, (rows, columns)), shape=(layout.size, len(single) + len(across)))
+    return Csr((values, (rows, columns)), shape=(layout.size, len(single) + len(across)))
 
 
 def classify(

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.costs import count_flops
+from fenics_contact._base.csr import Csr
 from fenics_contact._base.libraries import MPI
 from fenics_contact.qp.coarse import (
     CoarseSpace,
@@ -109,7 +110,7 @@ class FaceSystems:
         if problem.coarse.faces is None:
             # Kept without its zeros: dense, it would be one matrix more beside those of each face.
             gluing = gram_matrix(problem.comm, problem.coarse.matrix[:, problem.layout.equality])
-            self._equality_gram = sp.csr_matrix(gluing)
+            self._equality_gram = Csr(gluing)
 
     def build(self, face: Face) -> FaceSystem:
         """Return the system of a face. Collective."""
@@ -258,7 +259,7 @@ class CoupledSystem:
         if not damped:
             return cls(system, tested, moving, curvature, oblique, oblique)
         damping = np.maximum(system.face.damping, least_damping)
-        spared = coarse.restricted(sp.csr_matrix(moving @ sp.diags(damping)), whole=whole)
+        spared = coarse.restricted(Csr(moving @ sp.diags(damping)), whole=whole)
         return cls(system, tested, moving, curvature, oblique, DampedEquilibrium(damping, spared))
 
     def transposed(self, coarse: CoarseSpace) -> CoupledSystem | None:
