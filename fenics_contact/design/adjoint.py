@@ -265,9 +265,8 @@ def solve_adjoint(
     the system of a Newton step with its two bases swapped.
 
     Everything is linear in the objective, also the start and the scale of the residual: rescaling the
-    objective rescales the adjoint, to rounding. `start`: multiplier of an adjoint to start from, owned, in
-    any scaling; that of the same objective at a less accurate state saves most products. By default the
-    multiplier of the state.
+    objective rescales the adjoint, to rounding. It starts from a multiple of the multiplier of the state, and
+    one of `start`, owned, in any scaling: what else the adjoint of the same objective had at a state nearby.
     """
     system = state.dual
     followed = state.torn.decomposition.on_followed(partials.by_displacement)
@@ -296,8 +295,9 @@ def solve_adjoint(
     points = system.points
     load += points.T @ np.broadcast_to(partials.by_motion, points.shape[0])
     # At a minimum of the energy without slip the adjoint multiplier is minus the multiplier itself.
-    guess = state.solution.multiplier if start is None else start
-    begin = _begin(problem, transposed, right, load, linearised.tested.T @ (guess / factor))
+    guesses = [state.solution.multiplier, *([] if start is None else [start])]
+    guesses = [linearised.tested.T @ (guess / factor) for guess in guesses]
+    begin = _begin(problem, transposed, right, load, guesses)
     weights = np.ones(len(right))
     small = max(tolerance * begin.size, begin.rounding)
     point, gradient, iterations, exact = begin.point, begin.gradient, 0, problem.exact
@@ -343,27 +343,42 @@ class _Begin:
 
 
 def _begin(
-    problem: DualProblem, transposed: CoupledSystem, right: np.ndarray, load: np.ndarray, guess: np.ndarray
+    problem: DualProblem,
+    transposed: CoupledSystem,
+    right: np.ndarray,
+    load: np.ndarray,
+    guesses: Sequence[np.ndarray],
 ) -> _Begin:
-    """Return the shortest z that balances the load plus that multiple of the guess that fits best.
+    """Return the shortest z that balances the load plus those multiples of guesses that fit best together.
 
-    The guess has its own units (forces, or those of another objective), so its factor is computed.
-    Collective; one product each for load and guess.
+    Guesses have their own units (forces, or those of another objective), so their factors are computed.
+    Collective; one product each for load and guesses.
     """
 
     def image(z: np.ndarray) -> np.ndarray:
         return transposed.operate(z, apply_unless_zero(problem, problem.operator, transposed.moving @ z))
 
     bearing = transposed.balanced(np.zeros_like(right), load)
-    direction = transposed.balanced(guess, np.zeros_like(load))
-    borne, turned = image(bearing), image(direction)
+    point, borne = bearing, image(bearing)
     gradient = borne - right
-    rest, along = transposed.oblique(gradient), transposed.oblique(turned)
-    slope, square = problem.dot(along, rest), problem.dot(along, along)
-    share = -slope / square if square > 0.0 else 0.0
+    rest = transposed.oblique(gradient)
     size = max(problem.norm(transposed.oblique(right)), problem.norm(rest))
-    rounding = ROUNDING * max(problem.norm(part) for part in (right, borne, share * turned))
-    return _Begin(bearing + share * direction, gradient + share * turned, size, rounding)
+    largest, used = max(problem.norm(right), problem.norm(borne)), list[tuple[np.ndarray, ...]]()
+    for guess in guesses:
+        direction = transposed.balanced(guess, np.zeros_like(load))
+        turned = image(direction)
+        along = transposed.oblique(turned)
+        for earlier in used:  # the residuals that guesses leave are orthogonal to what earlier ones change
+            share = problem.dot(earlier[-1], along) / problem.dot(earlier[-1], earlier[-1])
+            new = zip((direction, turned, along), earlier, strict=True)
+            direction, turned, along = (one - share * other for one, other in new)
+        square = problem.dot(along, along)
+        if square > 0.0:
+            share = -problem.dot(along, rest) / square
+            point, gradient, rest = point + share * direction, gradient + share * turned, rest + share * along
+            largest = max(largest, problem.norm(share * turned))
+            used.append((direction, turned, along))
+    return _Begin(point, gradient, size, ROUNDING * largest)
 
 
 def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:

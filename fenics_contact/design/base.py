@@ -14,6 +14,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.fingerprint import described
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.scene import Scene
+from fenics_contact.design.adjoint_starts import NoAdjointStart
 from fenics_contact.design.design import SurfaceDesign
 from fenics_contact.design.memory import DesignPoint, DesignRecord, JointPoint
 from fenics_contact.design.objective import Objective
@@ -170,6 +171,8 @@ class SingleProblem(DesignProblem[DesignPoint]):
     """A design problem with one state a design."""
 
     objective: Objective
+    #: What the next adjoint starts from.
+    _adjoint_start: NoAdjointStart
 
     @abstractmethod
     def state_of(self, alpha: np.ndarray) -> AnyState:
@@ -190,7 +193,7 @@ class SingleProblem(DesignProblem[DesignPoint]):
 def with_objective(problem: Single, objective: Objective) -> Single:
     """Return a copy of a problem with another objective; products are counted by both."""
     other = copy(problem)
-    other.objective = objective
+    other.objective, other._adjoint_start = objective, NoAdjointStart()
     return other
 
 

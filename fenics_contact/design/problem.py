@@ -17,6 +17,13 @@ from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.adjoint import WeakChoice, linearise_face, require_from_rest
+from fenics_contact.design.adjoint_starts import (
+    STORED,
+    AdjointStart,
+    NoAdjointStart,
+    adjoint_tolerance,
+    restored,
+)
 from fenics_contact.design.base import SingleProblem, comm_of, with_fewest_weak_points, with_objective
 from fenics_contact.design.design import SurfaceDesign
 from fenics_contact.design.memory import AdaptiveTolerance, DesignMemory, DesignPoint, Stored, tightest_of
@@ -164,10 +171,6 @@ def check_case(first: Scene, scene: Scene) -> None:
             )
 
 
-#: Tolerance of the adjoint relative to that of its state, and the smallest: no looser than the state's.
-ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
-
-
 @displayed
 class ShapeProblem(SingleProblem):
     """J(α) with a subgradient, for one or more moving surfaces of a scene.
@@ -206,13 +209,17 @@ class ShapeProblem(SingleProblem):
             choice: Branch for weakly active points.
             tolerance: Relative residual of all states, or `AdaptiveTolerance()`, with which an optimiser
                 requests the accuracy that it needs; None for that of ``contact``, or of its solver, as a
-                balanced state leaves the statuses uncertain on which derivatives depend.
+                balanced state leaves the statuses uncertain on which derivatives depend. The adjoint has ten
+                times this as its relative residual, 1e-4 at most, and a tenth of it where points are between
+                two statuses; the gradient is off by less than twice that: compare it with difference
+                quotients of states with 1e-8 and less.
         """
         self.contact, self.objective, self.choice = checked_contact(contact), objective, choice
         self.scene, self.tolerance = contact.scene, tolerance
         self._tightest = tightest_of(contact, tolerance)
         self._timer = contact.timer
         self._memory: DesignMemory = DesignMemory(self._restored)
+        self._adjoint_start = NoAdjointStart()
         self._neighbour: ShapeProblem | None = None
         self._apart = False
         with self._timer.phase("mesh motion"):
@@ -276,11 +283,12 @@ class ShapeProblem(SingleProblem):
             raise InvalidInputError(
                 "checkpoints of designs need linear materials, got others: leave the checkpoint out"
             )
-        return self._memory.stored()
+        return self._memory.stored() | self._adjoint_start.at(self._memory.state).stored()
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
         """Continue from what `memory` returned, also on another number of ranks. Collective."""
-        self._memory.recall(memory)
+        self._memory.recall({name: memory[name] for name in memory if name != STORED})
+        self._adjoint_start = restored(memory, self._memory.state)
 
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
         """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
@@ -319,8 +327,7 @@ class ShapeProblem(SingleProblem):
         """
         scene = self.scene_of(alpha)
         state = design_state(self.contact, scene, coarse, self._tightest, refinements=refinements)
-        self._memory.record_state(alpha, state)
-        self._memory.products += state.products
+        self._record_state(alpha, state)
         return state
 
     @collectively("ShapeProblem.on", lambda self, contact, *_: contact.comm)
@@ -439,9 +446,14 @@ class ShapeProblem(SingleProblem):
         with self._timer.phase("mesh motion"):
             scene = self.scene_of(alpha) if known is None else known.state.scene
         state = design_state(self.contact, scene, previous, tolerance, before=after)
+        self._record_state(alpha, state)
+        return state
+
+    def _record_state(self, alpha: np.ndarray, state: AnyState) -> None:
+        """Keep what the next state and the next adjoint start from. Collective."""
         self._memory.record_state(alpha, state)
         self._memory.products += state.products
-        return state
+        self._adjoint_start = self._adjoint_start.at(state)
 
     def _point_at(
         self,
@@ -457,9 +469,13 @@ class ShapeProblem(SingleProblem):
             partials = self.partials_of(self.objective, state)
         with one_thread(self.comm), self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
-            start = None if known is None else known.adjoint_multiplier
-            accuracy = max(ADJOINT_SHARE * tolerance, ADJOINT_FLOOR)
-            adjoint, error, partials = adjoint_of(state, partials, linearised, accuracy, start)
+            start, accuracy = self._adjoint_start, adjoint_tolerance(tolerance, linearised.weak)
+            if known is not None:
+                start = AdjointStart.of(known.state, known.adjoint_multiplier)
+            adjoint, error, partials = adjoint_of(
+                state, partials, linearised, accuracy, start.at(state).direction()
+            )
+            self._adjoint_start = AdjointStart.of(state, adjoint.multiplier)
         with one_thread(self.comm), self._timer.phase("gradient"):
             by_points = by_nodes(state, adjoint, partials, linearised, self.geometry.forms)
             gradient = self.geometry.pull_back(by_points)

@@ -176,7 +176,7 @@ def adjoint_of(
 ) -> tuple[Adjoint, StateError, Partials]:
     """Solve the adjoint of a state and weigh its residuals with it. Collective.
 
-    `start`: multiplier of a neighbouring adjoint, owned, or None; not used for deformed states.
+    `start`: of `solve_adjoint`, not used for deformed states.
     """
     if isinstance(state, DeformedState):
         adjoint = solve_deformed_adjoint(state, partials, linearised, tolerance=tolerance)

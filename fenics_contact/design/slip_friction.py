@@ -48,18 +48,18 @@ def solve_following_slip(
         by_slip[chosen] = y[:, None] * direction[chosen]
         return with_later_steps(state, own, _on_rows(torn, by_slip)) if len(y) else own
 
-    def solved(own: Partials) -> tuple[Adjoint, np.ndarray]:
+    def solved(own: Partials, begin: np.ndarray | None = None) -> tuple[Adjoint, np.ndarray]:
         nonlocal spent
-        adjoint = solve_adjoint(state, own, linearised, tolerance=tolerance, start=start)
+        adjoint = solve_adjoint(state, own, linearised, tolerance=tolerance, start=begin)
         spent += adjoint.iterations
         by_bound = bound_sensitivity(torn, own.by_multiplier, adjoint.displacement, linearised)
         return adjoint, (slope * by_bound)[chosen]
 
-    adjoint, right = solved(partials)
+    adjoint, right = solved(partials, start)
     if np.any(right):
         y = _smallest_residual(lambda y: y - solved(following(nothing, y))[1], right, tolerance, max_adjoints)
         partials = following(partials, y)
-        adjoint, _ = solved(partials)
+        adjoint, _ = solved(partials, start)
     return replace(adjoint, iterations=spent), partials
 
 

@@ -41,6 +41,8 @@ from fenics_contact.design import (
     VolumeIntegral,
 )
 from fenics_contact.design.adjoint import linearise_face, solve_adjoint
+from fenics_contact.design.adjoint_starts import adjoint_tolerance
+from fenics_contact.design.sensitivity import by_nodes
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.results import ContactResult
@@ -191,7 +193,8 @@ def test_gradients_at_default_tolerances_agree_with_difference_quotients(units: 
     slope = here.gradient(objective) @ DIRECTION
     assert abs(slope) > 0.1 * np.linalg.norm(here.gradient(objective))
     # Of strict states: the tolerance of the gradient alone is seen.
-    assert slope == pytest.approx(here.quotient(objective, "strict"), rel=1e-5)
+    stated = 2.0 * adjoint_tolerance(1e-6, here.point(objective).weak)
+    assert slope == pytest.approx(here.quotient(objective, "strict"), rel=stated)
     # Of the user's own states, whose tolerance the quotient magnifies.
     assert slope == pytest.approx(here.quotient(objective, "usual"), rel=1e-3)
 
@@ -248,11 +251,14 @@ def test_the_gradient_of_a_small_multiple_is_that_multiple_of_the_gradient() -> 
 
 @pytest.mark.parametrize("units", UNITS)
 @pytest.mark.parametrize("objective", OBJECTIVES)
-def test_the_adjoint_of_a_state_at_default_tolerance_is_more_accurate_than_the_state(
-    objective: str, units: str
-) -> None:
+def test_the_gradient_at_default_tolerance_is_as_accurate_as_stated(objective: str, units: str) -> None:
+    """It costs fewer products than an exact one, and is another one, by less than twice the residual."""
     here, point = measured(units), measured(units).point(objective)
     partials = OBJECTIVES[objective][0].partials(point.state, here.usual.geometry.forms)
     linearised = linearise_face(point.state, here.usual.choice)
+    assert point.weak.count == 0
     exact = solve_adjoint(point.state, partials, linearised, tolerance=STRICT)
-    assert 0.0 < apart(point.adjoint_multiplier, exact.multiplier) < 0.5 * point.tolerance
+    assert point.adjoint_iterations < exact.iterations
+    at_nodes = by_nodes(point.state, exact, partials, linearised, here.usual.geometry.forms)
+    off = apart(point.gradient, here.usual.geometry.pull_back(at_nodes))
+    assert 0.0 < off < 2.0 * adjoint_tolerance(point.tolerance, point.weak) == pytest.approx(2e-5)
