@@ -21,9 +21,10 @@ from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 
+from fenics_contact._base.checks import brief
 from fenics_contact._base.costs import ledger_of
 from fenics_contact._base.libraries import MPI
-from fenics_contact.errors import together
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.ranks import own_of
 
 Found = TypeVar("Found")
@@ -42,12 +43,15 @@ def once_a_machine(comm: MPI.Comm, make: Callable[[], Found]) -> Found:
 
     Raises:
         BaseException: What the function raises, on all ranks.
+        InvalidInputError: If it is no function.
 
     Example:
         >>> from mpi4py import MPI
         >>> once_a_machine(MPI.COMM_SELF, lambda: np.arange(3))
         array([0, 1, 2])
     """
+    if not callable(make):
+        raise InvalidInputError(f"make must be a function of no argument, got {brief(make)}: write a lambda")
     if comm.size == 1:
         return make()
     machine, packed, file = ranks_of_machine(comm), _NOTHING, _NO_FILE
@@ -70,6 +74,8 @@ def is_shared(array: np.ndarray) -> bool:
 
 def ranks_of_machine(comm: MPI.Comm) -> MPI.Comm:
     """Return the ranks on this rank's machine, which `comm` owns. Collective on ``comm`` on first use."""
+    if comm.size == 1:
+        return comm
     key = _key(type(comm).__mro__[-2])
     ranks = comm.Get_attr(key)
     if ranks is None:

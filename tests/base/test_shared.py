@@ -12,6 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact._base.shared import is_shared, once_a_machine
+from fenics_contact.errors import InvalidInputError
 from tests.base.shared_on_ranks import LARGE
 from tests.conftest import run_on_ranks
 
@@ -38,6 +39,13 @@ def test_one_rank_gets_the_object_itself() -> None:
     made = {"table": np.arange(LARGE)}
     assert once_a_machine(MPI.COMM_SELF, lambda: made) is made
     assert not is_shared(made["table"])
+
+
+def test_what_is_no_function_is_refused() -> None:
+    with pytest.raises(
+        InvalidInputError, match=r"make must be a function of no argument, got .*: write a lambda"
+    ):
+        once_a_machine(MPI.COMM_SELF, np.arange(3))  # type: ignore[arg-type]
 
 
 @SEVERAL
