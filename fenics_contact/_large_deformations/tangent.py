@@ -30,6 +30,7 @@ from fenics_contact.feti.factor import (
 )
 from fenics_contact.feti.inverse import FactoredOperator, LocalKind, TornInverse, dofs_inside
 from fenics_contact.feti.kernel_basis import TornModes
+from fenics_contact.feti.sewing import NOT_SEWN, NotSewn
 from fenics_contact.feti.subdomain import CachedMatrix, LocalOperator, Subdomain
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.coarse import CoarseSpace
@@ -432,6 +433,10 @@ class TangentSystem(DualSystem):
             self.stiffness = Csr(sp.block_diag([self.stiffness, own]))
             motions = motions.combined(sp.eye(total, total + count, format="csr"))
         return motions
+
+    def _sewing(self) -> NotSewn:
+        """Return none: tangents change with every step, and may be indefinite."""
+        return NOT_SEWN
 
     def _without_unheld(self, coarse: CoarseSpace) -> CoarseSpace:
         """Leave the motions as they are: under stress they may have a stiffness."""

@@ -26,7 +26,7 @@ class Inside:
         stiffness = subdomain.stiffness
         self.dofs = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
         rows = stiffness[self.dofs]
-        self._K_ib, self._K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
+        self._K_ib, self.K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
         self._factor = Factor.of_stiffness(rows[:, self.dofs].tocsr())
         if not held:
             subdomain.matrix.forget()
@@ -49,7 +49,7 @@ class Inside:
     def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return −K_ii⁻¹ K_ib w and S w for an interface displacement w."""
         inner = -self.solve(self.pulled(displacement))
-        return inner, self._K_bb @ displacement + self.passed(inner)
+        return inner, self.K_bb @ displacement + self.passed(inner)
 
 
 class Insides:
@@ -125,6 +125,11 @@ class CompactOperator:
     def flops(self) -> tuple[int, int]:
         """Floating point operations of `apply_flexibility` and of `apply_stiffness`."""
         return 2 * self._size**2, 2 * self._size**2
+
+    @property
+    def interface_stiffness(self) -> sp.csr_matrix:
+        """K_bb, shape (n_b, n_b), assembled again."""
+        return self._insides.of(self).K_bb
 
     def make_inside(self) -> Inside:
         """Assemble and factor what is inside."""

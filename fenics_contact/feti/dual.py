@@ -23,6 +23,7 @@ from fenics_contact.feti.decomposition import DualNumbering
 from fenics_contact.feti.inverse import LocalKind, TornInverse
 from fenics_contact.feti.kernel_basis import TornModes, whole_motions
 from fenics_contact.feti.reduced_coarse import Elimination
+from fenics_contact.feti.sewing import NOT_SEWN, NotSewn, Sewing
 from fenics_contact.feti.soft_motions import NoSoftMotions, SoftMotions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
@@ -42,7 +43,7 @@ class DirichletPreconditioner:
     D is the typical stiffness at each copy of a node, so that of two neighbours the softer one deforms. C is
     the compliance of rows that give way: a jump is closed by bodies and springs, each as it is soft. Gluing
     and Dirichlet rows are orthogonal in D⁻¹: A is diagonal except for the rows of contacts and ties, where it
-    is factored.
+    is factored. Before S and after it copies of nodes move together, see `sewing`.
 
     References:
         Farhat, Roux: An unconventional domain decomposition method for an efficient parallel solution of
@@ -61,6 +62,7 @@ class DirichletPreconditioner:
     ) -> None:
         """Factor the contact block of B D⁻¹ Bᵀ. Collective."""
         self._inverse, self._numbering = inverse, numbering
+        self._sewing: NotSewn = NOT_SEWN
         self._soft, self._sprung = np.zeros(0, dtype=np.int64), np.zeros(0)
         self._B = scaled_columns(B, compliance)
         self._Bt = self._B.T  # shares its memory
@@ -91,10 +93,15 @@ class DirichletPreconditioner:
         added[rows] = unit * compliance
         self._softened = self._contact.softened(added)
 
+    def sew(self, sewing: NotSewn) -> None:
+        """Move copies of nodes together from now on."""
+        self._sewing = sewing
+
     def _apply(self, residual: np.ndarray, contact: ContactBlock) -> np.ndarray:
         count_flops(self._numbering.comm, self._inverse.flops[1] + 4 * self._B.nnz)
         forces = contact.solve(self._equality * residual)
-        stiffened = self._inverse.apply_stiffness(self._Bt @ self._numbering.to_local(forces))
+        displacement = self._sewing.eased(self._Bt @ self._numbering.to_local(forces))
+        stiffened = self._sewing.eased_transposed(self._inverse.apply_stiffness(displacement))
         jump = self._numbering.to_owned(self._B @ stiffened)
         jump[self._soft] += self._sprung * forces[self._soft]
         return self._equality * contact.solve(jump)
@@ -126,7 +133,7 @@ class PreconditionerOfFace:
 
 @dataclass(frozen=True, eq=False)
 class Lifting:
-    """The two factors of the preconditioner on a face, M = Lᵀ S L with L = D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹.
+    """The two factors of the preconditioner on a face, M = Lᵀ S L with L = D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹, unsewn.
 
     B L r = r on the rows of the face, up to the regularisation of the contact block.
     """
@@ -270,6 +277,7 @@ class DualSystem:
             preconditioner = DirichletPreconditioner(
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
+            preconditioner.sew(self._sewing())
             if torn.groups.compliance.any():
                 preconditioner.soften(torn.compliance.soft, torn.compliance.constant, self._stiffest)
             diagonal, supported = self._diagonal()
@@ -499,6 +507,12 @@ class DualSystem:
         of_block = np.empty(len(here))
         of_block[block] = 1.0 / decomposition.tearing.copy_stiffness[here]
         return of_block[self.inverse.interface // self.torn.components]
+
+    def _sewing(self) -> NotSewn:
+        """Return how the preconditioner moves copies of nodes together. Collective."""
+        if self.inverse.is_rounded:  # where memory is short, no further matrices are stored
+            return NOT_SEWN
+        return Sewing.of(self.torn, self._B_interface, self.inverse.interface_stiffness())
 
     def _scaling(self, coarse: CoarseSpace) -> Scaling | Unscaled:
         """Return factors √(b·b / b·D⁻¹b) of the rows b of B, one where stiffness is uniform. Collective."""

@@ -75,6 +75,11 @@ class ExplicitOperator:
         """Floating point operations of `apply_flexibility` and of `apply_stiffness`."""
         return 2 * self._size**2, 2 * self._size**2
 
+    @property
+    def interface_stiffness(self) -> sp.csr_matrix:
+        """K_bb, shape (n_b, n_b)."""
+        return self._K_bb
+
     def apply_flexibility(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force into ``displacement``."""
         if self._flexible.ndim == 2:
@@ -227,6 +232,11 @@ class FactoredOperator:
     def flops(self) -> tuple[int, int]:
         """Floating point operations of both operators: two for each entry and substitution."""
         return 4 * self._factor.entries, 4 * self._inside.entries + 2 * self._K_bb.nnz + 4 * self._K_bi.nnz
+
+    @property
+    def interface_stiffness(self) -> sp.csr_matrix:
+        """K_bb, shape (n_b, n_b)."""
+        return self._K_bb
 
     def apply_flexibility(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write the inverse on the interface times a force there into ``displacement``."""
@@ -473,6 +483,11 @@ class TornInverse:
         return self._each(
             lambda one: one.apply_stiffness, lambda all_: all_.apply_stiffness_to_all, displacement
         )
+
+    def interface_stiffness(self) -> sp.csr_matrix:
+        """Return K on the interface, the inside held, shape (n_interface, n_interface)."""
+        blocks = [operator.interface_stiffness for operator in self.operators]
+        return sp.csr_matrix(sp.block_diag([sp.csr_matrix((0, 0)), *blocks]))
 
     def energy(self, displacement: np.ndarray) -> tuple[float, np.ndarray]:
         """Return wᵀ S w of this rank and S w, shape (n_interface,), both in double precision.

@@ -154,6 +154,12 @@ class CongruentOperator:
         """Floating point operations of `apply_flexibility` and of `apply_stiffness`."""
         return self.first.flops
 
+    @property
+    def interface_stiffness(self) -> sp.csr_matrix:
+        """K_bb, shape (n_b, n_b)."""
+        moved = self._interface.matrix
+        return (moved.T @ self.first.interface_stiffness @ moved).tocsr()
+
     def apply_flexibility(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force, shape (n_b,), into ``displacement``."""
         self.first.apply_flexibility(self._interface.there(force), moved := np.empty_like(force))

@@ -53,6 +53,10 @@ class LocalOperator(Protocol):
     def flops(self) -> tuple[int, int]:
         """Floating point operations of `apply_flexibility` and of `apply_stiffness`."""
 
+    @property
+    def interface_stiffness(self) -> sp.csr_matrix:
+        """K_bb, shape (n_b, n_b)."""
+
     def apply_flexibility(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force, shape (n_b,), into ``displacement``."""
 

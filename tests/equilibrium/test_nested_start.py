@@ -33,7 +33,7 @@ def test_on_the_same_meshes_the_start_is_the_answer(name: str) -> None:
     wanted = 1e-3 if name in ("ties", "tie beside", "preload", "fluid") else 1e-6
     again = ContactProblem(scene, SELF, partitions=cut(scene, 5), tolerance=wanted)
     state = again.solve(start=before, refinements={})
-    assert before.solution.products > 9
+    assert before.solution.products > 5
     assert state.solution.history[-1].note.startswith("the answer already")
     assert state.energies.strain == pytest.approx(before.energies.strain, rel=wanted)
 

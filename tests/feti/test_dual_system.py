@@ -146,7 +146,9 @@ def test_the_preconditioner_is_symmetric_and_positive_in_equilibrium(
     assert np.linalg.eigvalsh(basis.T @ M @ basis).min() > 1e-6 * size
 
 
-def test_the_preconditioner_is_the_scaled_schur_complement(system: DualSystem, kind: LocalKind) -> None:
+def test_the_preconditioner_is_the_schur_complement_of_sewn_jumps(
+    system: DualSystem, kind: LocalKind
+) -> None:
     B, n = system.torn.B.toarray(), system.torn.n_equality
     touched = np.abs(B).sum(axis=0) > 0
     S = np.zeros((B.shape[1],) * 2)
@@ -165,7 +167,9 @@ def test_the_preconditioner_is_the_scaled_schur_complement(system: DualSystem, k
     gram = weighted @ B.T
     gram[n:, n:] += REGULARISATION * np.diag(np.diag(gram[n:, n:]))
     scale = scipy.linalg.block_diag(np.diag(1.0 / np.diag(gram)[:n]), np.linalg.inv(gram[n:, n:]))
-    expected = scale @ weighted @ S @ weighted.T @ scale
+    lifted, b = weighted.T @ scale, system.inverse.interface
+    lifted[b] = np.column_stack([system.preconditioner._sewing.eased(column) for column in lifted[b].T])
+    expected = lifted.T @ S @ lifted
     assert system.problem.preconditioner is not None
     M = dense(system, system.problem.preconditioner)
     assert np.abs(M - expected).max() < 10 * ROUNDING[kind] * np.abs(expected).max()
