@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact import Body, Scene, Support, TotalForce
+from fenics_contact import Body, ContactPair, Coulomb, Scene, Support, Surface, TotalForce, solve_scene
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.sewing import NOT_SEWN, Sewing
-from fenics_contact.gallery import block, hemisphere
+from fenics_contact.gallery import block, box_lattice, hemisphere
 from fenics_contact.mesh import bisection_partition
 from tests.feti.scenes import CELLS, STEEL, Cut, clamped_block, ragged_block, touching_blocks
 
@@ -147,3 +149,36 @@ def test_subdomains_alike_have_the_stiffness_of_their_own(kind: LocalKind) -> No
     ]
     apart = inverse.interface_stiffness() - sp.block_diag(exact)
     assert abs(apart).max() < 1e-12 * abs(exact[0]).max()
+
+
+# Contact: few products whichever way it is discretised, and whatever the cells.
+def hertz(discretisation: str, cell: str, friction: float) -> Scene:
+    """A quarter of a ball of hexahedra on a block, cells graded towards the spot and both cuts."""
+    along = 10.0 * np.expm1(3 * np.linspace(0, 1, 11)) / np.expm1(3)
+    meshes = {
+        "ball": hemisphere(10.0, 8),
+        "block": box_lattice([1.05 * along, along, -along[::-1]], cell),
+    }
+    law: dict[str, Any] = {"discretisation": discretisation}
+    if friction:
+        law["friction"] = Coulomb(friction)
+    held = [Support(name, side, value) for name in meshes for side, value in SYMMETRIC.items()]
+    return Scene(
+        {name: Body(mesh, STEEL) for name, mesh in meshes.items()},
+        [*held, Support("block", "z0", (None, None, 0.0))],
+        [TotalForce("ball", "top", (0.0, 0.0, -3.75))],
+        [ContactPair(Surface("block", "z1"), Surface("ball", "contact"), **law)],
+    )
+
+
+@pytest.mark.parametrize(
+    ("discretisation", "cell", "friction"),
+    [("mortar", "tetrahedron", 0.0), ("mortar", "tetrahedron", 0.3), ("node", "hexahedron", 0.0)],
+)
+def test_balls_on_blocks_take_few_products(discretisation: str, cell: str, friction: float) -> None:
+    state = solve_scene(hertz(discretisation, cell, friction), MPI.COMM_SELF, tolerance=1e-6)
+    print(f"\nball on block, {discretisation}, {cell}, {friction}: {state.counts}")
+    assert state.counts["subdomains"] >= 6
+    assert state.balance().imbalance < 1e-9
+    assert 10 < np.count_nonzero(state.contact.normal_force) < 0.5 * state.contact.points.count
+    assert state.counts["f_products"] < 65  # 90, 103 and 91 without either

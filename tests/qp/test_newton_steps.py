@@ -256,7 +256,7 @@ def test_a_rescue_comes_nearer_from_anywhere(preconditioned: bool) -> None:
 
 
 def test_the_history_says_why_a_rescue_was_called_and_what_it_reached() -> None:
-    dual, _ = torn_problem(Bricks(cubes=(2, 2), crown=0.2, tilt=0.5))
+    dual, _ = torn_problem(Bricks(cubes=(2, 2), crown=1.0, tilt=1.5))
     hasty = FaceNewton(tolerance=1e-10, patience=1, forcing=0.9, loosest=0.5)
     found = solve(dual, None, hasty, friction_coefficient=np.full(dual.layout.n_friction, 0.3))
     notes = [step.note for step in found.history if "rescue" in step.method]
