@@ -27,7 +27,7 @@ HELD = {
     "chain-compared-2": Held(66528, 60),
     "chain-default": Held(72576, 33),
     "linear-face": Held(66528, 49),
-    "frictionless-block": Held(34992, 19),
+    "frictionless-block": Held(34992, 24),
     "block-28k": Held(28611, 36),
     # 10 or 11 by the processor, 16 to 18 with PETSc 3.22; without the rigid motions 22.
     "gamg-28k": Held(28611, 11, margin=1.7),

@@ -512,6 +512,9 @@ class DualSystem:
         """Return how the preconditioner moves copies of nodes together. Collective."""
         if self.inverse.is_rounded:  # where memory is short, no further matrices are stored
             return NOT_SEWN
+        coupled = self.inverse.strongest_coupling(self.torn.components)
+        if self.torn.numbering.comm.allreduce(coupled, op=MPI.MAX) < Sewing.coupled:
+            return NOT_SEWN
         return Sewing.of(self.torn, self._B_interface, self.inverse.interface_stiffness())
 
     def _scaling(self, coarse: CoarseSpace) -> Scaling | Unscaled:

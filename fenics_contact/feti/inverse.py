@@ -489,6 +489,17 @@ class TornInverse:
         blocks = [operator.interface_stiffness for operator in self.operators]
         return sp.csr_matrix(sp.block_diag([sp.csr_matrix((0, 0)), *blocks]))
 
+    def strongest_coupling(self, components: int) -> float:
+        """Return the largest |K_ij| / √(K_ii K_jj) between two nodes of the interface of a subdomain."""
+        largest = 0.0
+        for operator in filter(None, (kind.operator for kind in self.kinds)):
+            stiffness = operator.interface_stiffness.tocoo()
+            scale = 1.0 / np.sqrt(stiffness.diagonal())
+            apart = stiffness.row // components != stiffness.col // components
+            coupled = np.abs(stiffness.data) * scale[stiffness.row] * scale[stiffness.col]
+            largest = max(largest, float(coupled[apart].max(initial=0.0)))
+        return largest
+
     def energy(self, displacement: np.ndarray) -> tuple[float, np.ndarray]:
         """Return wᵀ S w of this rank and S w, shape (n_interface,), both in double precision.
 

