@@ -10,6 +10,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import cache
+from itertools import product
 from math import log2
 from time import perf_counter
 from typing import Any
@@ -37,6 +39,7 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact._base.sparse import FACTOR_BYTES, ROWS_PER_RANK, prefers_explicit
+from fenics_contact._scene.dealing import Dealing
 from fenics_contact.feti.reduced_coarse import Elimination
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
@@ -56,8 +59,10 @@ COARSE, CONTACT, SCALARS, MATRICES = (2.5, 4.5), (2.0, -2.0), (3.0, 5.0), 3.5
 LU, REDUCED, COUNTED = (64.0, 2.3), (22.0, 3.8), 24576
 #: Seconds in which a Newton step factors its reduced matrices, of size 1536.
 DENSE_STEP = 0.24
-#: Neighbours of a cube in a lattice.
-NEIGHBOURS = 26
+
+
+#: Sides glued, clamped or in contact, of the first, an inner and the last subdomain in each direction.
+SIDES = np.array([[2, 2, 1], [1, 2, 1], [2, 2, 1]])
 
 
 @dataclass(frozen=True)
@@ -104,6 +109,36 @@ class Machine:
         return lattice.products * (self.iteration + self.subdomain * lattice.side**3 / ranks)
 
 
+@cache
+def exchanged(side: int, edge: int, ranks: int) -> tuple[int, int]:
+    """Return the messages and the faces between subdomains of an exchange, of the rank with the most each.
+
+    Those of a lattice of side³ boxes of edge³ hexahedra, dealt to ranks as those of a scene.
+    """
+    place = np.ones(side, dtype=int)
+    place[[0, -1]] = 0, 2
+    each = np.stack(np.meshgrid(*(own[place] for own in SIDES), indexing="ij"), axis=-1).reshape(-1, 3)
+    kind = np.unique(np.sort(each, axis=1), axis=0, return_inverse=True)[1].ravel()
+    size = np.full(len(each), 3 * (edge + 1) ** 3)
+    interface = size - 3 * (edge + 1 - each).prod(axis=1)
+    rank = Dealing.of(np.zeros(len(each), dtype=int), kind, size, interface).among(ranks)
+    rank = rank.reshape(side, side, side)
+    pairs, faces = set[tuple[int, int]](), np.zeros(ranks, dtype=int)
+    for step in product((-1, 0, 1), repeat=3):
+        if step <= (0, 0, 0):
+            continue
+        here = tuple(slice(max(-d, 0), side - max(d, 0)) for d in step)
+        there = tuple(slice(max(d, 0), side - max(-d, 0)) for d in step)
+        owner, other = rank[here].ravel(), rank[there].ravel()
+        apart = owner != other
+        pairs.update(zip(owner[apart].tolist(), other[apart].tolist(), strict=True))
+        if sum(map(abs, step)) == 1:
+            np.add.at(faces, owner[apart], 1)
+            np.add.at(faces, other[apart], 1)
+    messages = np.bincount(np.array(sorted(pairs), dtype=int).ravel(), minlength=ranks)
+    return int(messages.max()), int(faces.max())
+
+
 @dataclass(frozen=True)
 class Lattice:
     """A block cut into side³ equal boxes of edge³ hexahedra; one side is clamped, one lies on a plane.
@@ -125,10 +160,8 @@ class Lattice:
     def __post_init__(self) -> None:
         """Determine the operations of K⁺ and S of all subdomains, and the torn unknowns."""
         object.__setattr__(self, "unknowns", 3 * (self.edge + 1) ** 3 * self.side**3)
-        # Sides glued, clamped or in contact, of the first, an inner and the last subdomain in each direction.
-        sides = np.array([[2, 2, 1], [1, 2, 1], [2, 2, 1]])
         count, nodes = np.array([1, self.side - 2, 1]), self.edge + 1
-        inner = np.einsum("i,j,k->ijk", *(nodes - sides))
+        inner = np.einsum("i,j,k->ijk", *(nodes - SIDES))
         number = np.einsum("i,j,k->ijk", count, count, count)
         size, total = 3 * nodes**3, 0.0
         for free, many in zip(inner.ravel(), number.ravel(), strict=True):
@@ -150,15 +183,11 @@ class Lattice:
     def solve(self, ranks: int) -> PhaseCosts:
         """Return the costs of the iterations of the rank with the most.
 
-        Up to `side` ranks hold slabs, more of them cubes. A gluing row between two ranks belongs to a copy of
-        a node, not to the node: edges have several.
+        A gluing row between two ranks belongs to a copy of a node, not to the node: edges have several.
         """
         steps, products, size = self.steps, self.products, self.motions
         exchanges = 2 * products + 2 * (products - steps)
-        neighbours = min(ranks - 1, NEIGHBOURS if ranks > self.side else 2)
-        faces = float(neighbours * self.side**2)
-        if ranks > self.side:
-            faces = 6 * (1 - ranks ** (-1 / 3)) * (self.side**3 / ranks) ** (2 / 3)
+        partners, faces = exchanged(self.side, self.edge, ranks)
         coarse, contact, scalars = (a * products + b * steps for a, b in (COARSE, CONTACT, SCALARS))
         matrices, dense = MATRICES * steps, size <= DENSE_LIMIT
         # Two subdomains that share nodes fill 25 of 36 pairs of motions. Which ones is known by a bit each.
@@ -175,7 +204,7 @@ class Lattice:
         if ranks == 1:
             return PhaseCosts(flops=round(flops))
         return PhaseCosts(
-            messages=round(exchanges * neighbours + 2 * contact * (owners - 1)),
+            messages=round(exchanges * partners + 2 * contact * (owners - 1)),
             message_bytes=round(exchanges * 24 * faces * (self.edge + 1) ** 2 + 16 * contact * others),
             reductions=round(coarse + scalars + 2 * matrices * dense),
             reduction_bytes=round(bytes_),

@@ -82,7 +82,8 @@ class Closures:
 
         `forces`: a typical force; those of ``far`` times that would be too small.
         """
-        step = far * forces / np.maximum(closure, np.finfo(float).tiny)
+        least = 1e-30 * closure.max(initial=0.0)
+        step = far * forces / np.where(closure > least, closure, least or 1.0)
         return self.resolve(step * closure, step)
 
     def surplus(self, force: Vector, residual: Vector) -> Vector:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import json
 import sys
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -40,13 +41,16 @@ class Made:
         }
 
 
-def mapped() -> dict[str, int]:
-    """Return the files in memory that this rank has mapped: inode -> bytes."""
+def mapped(earlier: Collection[str] = ()) -> dict[str, int]:
+    """Return the files in memory that this rank has mapped but for some: inode -> bytes.
+
+    `earlier`: those of scripts that the same ranks have run before.
+    """
     lines = [
         line.split() for line in Path("/proc/self/maps").read_text().splitlines() if "memfd:fenics" in line
     ]
     ends = [(line[4], *(int(x, 16) for x in line[0].split("-"))) for line in lines]
-    return {inode: end - start for inode, start, end in ends}
+    return {inode: end - start for inode, start, end in ends if inode not in earlier}
 
 
 def is_protected(array: np.ndarray) -> bool:
@@ -58,7 +62,7 @@ def is_protected(array: np.ndarray) -> bool:
 
 def facts(comm: MPI.Comm, made: Made) -> dict[str, Any]:
     """Return what this rank finds in tables that are made once a machine. Collective."""
-    before = costs_of(comm).total.copy_bytes
+    before, earlier = costs_of(comm).total.copy_bytes, mapped()
     tables = once_a_machine(comm, made)
     expected = Made(made.first)()
     arrays = [tables["numbers"], tables["turned"]]
@@ -69,16 +73,16 @@ def facts(comm: MPI.Comm, made: Made) -> dict[str, Any]:
         "layout": bool(tables["turned"].flags.f_contiguous and tables["none"].shape == (0, 3)),
         "shared": [is_shared(array) for array in arrays],
         "protected": [is_protected(array) for array in arrays],
-        "files": mapped(),
+        "files": mapped(earlier),
         "copied": costs_of(comm).total.copy_bytes - before,
     }
     kept = arrays[1]
     del tables, arrays
     gc.collect()
-    found["while one is used"] = list(mapped())
+    found["while one is used"] = list(mapped(earlier))
     del kept
     gc.collect()
-    return {**found, "afterwards": list(mapped())}
+    return {**found, "afterwards": list(mapped(earlier))}
 
 
 def failing(comm: MPI.Comm) -> str:

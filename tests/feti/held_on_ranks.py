@@ -48,6 +48,7 @@ def tables(state: LinearState) -> dict[str, np.ndarray]:
 
 def answers(comm: MPI.Comm, order: int = 1, once: bool = False) -> dict[str, Any]:
     """Solve a block that sticks and slips, and return answers and what is shared. Collective."""
+    earlier = mapped()
     scene = of_quadratic_cells if order == 2 else lambda: pressed_block((6, 4, 4))
     given = once_a_machine(comm, scene) if once else scene()
     mesh = given.bodies["block"].mesh
@@ -58,7 +59,7 @@ def answers(comm: MPI.Comm, order: int = 1, once: bool = False) -> dict[str, Any
     found = {
         "shared": {name: is_shared(array) for name, array in held.items()},
         "writeable": [name for name, array in held.items() if array.flags.writeable],
-        "files": mapped(),
+        "files": mapped(earlier),
         "largest copy": state.costs.total.largest_copy,
         "bytes": sum(array.nbytes for array in held.values()),
         "potential": state.energies.total_potential,
@@ -68,7 +69,7 @@ def answers(comm: MPI.Comm, order: int = 1, once: bool = False) -> dict[str, Any
     }
     del state, held, given, mesh, scene
     gc.collect()
-    return {**found, "afterwards": list(mapped())}
+    return {**found, "afterwards": list(mapped(earlier))}
 
 
 def of_quadratic_cells() -> Scene:
