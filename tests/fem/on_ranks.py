@@ -81,7 +81,7 @@ def bodies(comm: MPI.Comm) -> dict[str, Any]:
 
 
 def bar(comm: MPI.Comm) -> dict[str, Any]:
-    """Solve a clamped bar in one subdomain a rank: the last rank owns no multiplier."""
+    """Solve a clamped bar in one subdomain a rank: that of the last one owns no multiplier."""
     mesh = block((0, 0, 0), (1, 1, 4), (2, 2, 4))
     supports, loads = [Support("bar", "z0")], [Traction("bar", "z1", (1.0, 0.0, 1.0))]
     scene = Scene({"bar": Body(mesh, STEEL)}, supports, loads)

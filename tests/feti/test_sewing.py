@@ -198,13 +198,15 @@ def hertz(discretisation: str, cell: str, friction: float) -> Scene:
 
 
 @pytest.mark.parametrize(
-    ("discretisation", "cell", "friction"),
-    [("mortar", "tetrahedron", 0.0), ("mortar", "tetrahedron", 0.3), ("node", "hexahedron", 0.0)],
+    ("discretisation", "cell", "friction", "most"),
+    [("mortar", "tetrahedron", 0.0, 65), ("mortar", "tetrahedron", 0.3, 75), ("node", "hexahedron", 0.0, 65)],
 )
-def test_balls_on_blocks_take_few_products(discretisation: str, cell: str, friction: float) -> None:
+def test_balls_on_blocks_take_few_products(
+    discretisation: str, cell: str, friction: float, most: int
+) -> None:
     state = solve_scene(hertz(discretisation, cell, friction), MPI.COMM_SELF, tolerance=1e-6)
     print(f"\nball on block, {discretisation}, {cell}, {friction}: {state.counts}")
     assert state.counts["subdomains"] >= 6
     assert state.balance().imbalance < 1e-9
     assert 10 < np.count_nonzero(state.contact.normal_force) < 0.5 * state.contact.points.count
-    assert state.counts["f_products"] < 65  # 90, 103 and 91 without either
+    assert state.counts["f_products"] < most  # 90, 103 and 91 without either
