@@ -373,15 +373,16 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
     sprung = statuses.soft[tangential[:, 0]]
     closed = statuses.closed & ~statuses.soft[system.problem.layout.normal]
     rows = _Rows(system, known, closed, statuses.stick & ~sprung, across & ~sprung)
-    closing = _close(rows, residual, cancelled, start)
+    closing = _close(rows, residual, cancelled)
     if closing.left > UNLIFTED:  # a node of two pairs may be set to stick where it should close
         nothing = np.zeros_like(across)
-        closing = _close(replace(rows, stick=nothing, across=nothing), residual, cancelled, start)
-    energy, force = system.inverse.energy(closing.displacement)
+        closing = _close(replace(rows, stick=nothing, across=nothing), residual, cancelled)
+    displacement = start + closing.displacement
+    energy, force = system.inverse.energy(displacement)
     energy = float(global_sum(comm, energy)[0])
     after = closing.residual - closing.rows.spread(closing.rows.wanted(closing.residual))
     estimate = -system.preconditioner.lifting(closing.rows.restriction).multiplier(force)
-    return Lifted(closing.displacement, energy, after, estimate, closing.left)
+    return Lifted(displacement, energy, after, estimate, closing.left)
 
 
 @dataclass(frozen=True, eq=False)
@@ -394,16 +395,16 @@ class _Closing:
     left: float
 
 
-def _close(rows: _Rows, residual: Vector, cancelled: float, w: Vector, refinements: int = 12) -> _Closing:
+def _close(rows: _Rows, residual: Vector, cancelled: float, refinements: int = 12) -> _Closing:
     """Close rows, and those that penetrate afterwards. Collective; no application of S."""
-    system, comm = rows.system, rows.system.problem.comm
+    system = rows.system
+    comm, w = system.problem.comm, np.zeros(len(system.inverse.interface))
     start = global_max(comm, np.abs(rows.wanted(residual)).max(initial=0.0))
     small = max(UNLIFTED * start, LAST_PLACES * cancelled)
-    moved = w
     lifting, current, violation = system.preconditioner.lifting(rows.restriction), residual, start
     for _ in range(refinements):
-        w = w + lifting.jump(rows.spread(rows.wanted(current)))
-        current = residual - system.interface_jump(w - moved)
+        w += lifting.jump(rows.spread(rows.wanted(current)))
+        current = residual - system.interface_jump(w)
         more = rows.penetrating(current, small)
         violation = global_max(comm, np.abs(rows.wanted(current)).max(initial=0.0))
         if global_sum(comm, np.count_nonzero(more))[0] > 0.0:

@@ -28,13 +28,7 @@ from fenics_contact.feti.soft_motions import NoSoftMotions, SoftMotions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import NO_ELIMINATION, CoarseSpace
-from fenics_contact.qp.problem import (
-    CompliantRows,
-    DualProblem,
-    Operator,
-    Scaling,
-    Unscaled,
-)
+from fenics_contact.qp.problem import CompliantRows, DualProblem, Operator, Scaling, Unscaled
 
 
 class DirichletPreconditioner:
