@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces, match_faces, vector_areas
+from fenics_contact.mesh.faces import match_faces, vector_areas
 from fenics_contact.mesh.hanging import HangingNodes
 
 
@@ -18,7 +18,7 @@ def boundary_defect(mesh: BodyMesh) -> np.ndarray:
     """
     chart = mesh.chart
     assert chart is not None
-    facets, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
+    facets, _ = mesh.boundary
     areas, count = vector_areas(mesh.points, facets), facets.shape[1]
     edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2)
 

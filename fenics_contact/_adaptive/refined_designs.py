@@ -15,7 +15,6 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.links import DesignSurface
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES
-from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.mesh.refinement import Refinement
 
 
@@ -49,7 +48,7 @@ def refined_design(
         [np.ones((len(lattice.nodes), 1)), lattice.parameters, lattice.directions]
     )
     values = interpolated(before, refinement, after, nodal)
-    facets, _ = boundary_faces(after.cells, dim, after.hanging)
+    facets, _ = after.boundary
     inside = np.abs(values[:, 0] - 1.0) < 1e-9  # sums of shape functions: 1 up to rounding, or away from it
     nodes = np.unique(facets[inside[facets].all(axis=1)])
     parameters, directions = np.split(values[nodes, 1:], [dim - 1], axis=1)

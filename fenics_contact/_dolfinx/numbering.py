@@ -167,10 +167,12 @@ def match_facets(mesh: dolfinx.mesh.Mesh, surface: np.ndarray) -> tuple[np.ndarr
     """
     cell_type = cell_type_of_mesh(mesh)
     local = np.array(facet_vertices(cell_type))
-    faces = np.sort(cell_nodes(mesh)[:, local].reshape(-1, local.shape[1]), axis=1)
+    nodes = cell_nodes(mesh)
+    near = np.flatnonzero(np.isin(nodes, surface)[:, local].all(axis=2))
+    faces = np.sort(nodes[near[:, None] // len(local), local[near % len(local)]], axis=1)
     wanted = np.sort(surface, axis=1)
     # One integer key per facet: rows of both tables are numbered together.
     _, key = np.unique(np.vstack([wanted, faces]), axis=0, return_inverse=True)
     key = key.ravel()
-    matches = np.flatnonzero(np.isin(key[len(wanted) :], key[: len(wanted)]))
+    matches = near[np.isin(key[len(wanted) :], key[: len(wanted)])]
     return matches // len(local), matches % len(local)

@@ -21,7 +21,7 @@ from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces, corners_of
+from fenics_contact.mesh.faces import corners_of
 from fenics_contact.mesh.near_surfaces import near_surfaces
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class AutomaticContact(Sequence[ContactPair]):
                 f"body {name!r} must have no surface 'boundary' yet, as AutomaticContact.self_contact names "
                 "all of its facets so: rename it"
             )
-        facets, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
+        facets, _ = mesh.boundary
         return replace(mesh, surfaces={**mesh.surfaces, "boundary": facets})
 
     def _pair(self, scene: SceneParts, one: str, other: str) -> ContactPair:
@@ -157,9 +157,7 @@ class AutomaticContact(Sequence[ContactPair]):
 
 def _facet_size(mesh: BodyMesh) -> float:
     """Return the mean size of the facets of a body's boundary, [length]."""
-    return _mean_size(
-        mesh.points[corners_of(boundary_faces(mesh.cells, mesh.dim, mesh.hanging)[0], mesh.dim)]
-    )
+    return _mean_size(mesh.points[corners_of(mesh.boundary[0], mesh.dim)])
 
 
 def _size(mesh: BodyMesh, surface: str) -> float:

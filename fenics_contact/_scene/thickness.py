@@ -13,7 +13,7 @@ from fenics_contact._scene.loads import Load
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
+from fenics_contact.mesh.faces import corners_of, match_faces
 
 
 def require_thickness(
@@ -54,7 +54,7 @@ def thickness_of_facets(body: Body, facets: np.ndarray) -> np.ndarray:
     thickness = body.thickness_of_cells
     if np.ptp(thickness) == 0.0:
         return np.full(len(facets), thickness[0])
-    boundary, cell = boundary_faces(body.mesh.cells, body.mesh.dim, body.mesh.hanging)
+    boundary, cell = body.mesh.boundary
     place = match_faces(corners_of(facets, body.mesh.dim), corners_of(boundary, body.mesh.dim))
     return np.asarray(thickness[cell[place]])
 

@@ -391,9 +391,20 @@ def _relief(
     order: int,
 ) -> Relief | None:
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], *mirrors)
-    hangs = np.isin(surface.nodes, mesh.hanging.nodes)
-    raised = reconstructed(surface, order) if shape is None else by_shape(surface, shape, hangs)
-    return None if is_flat(raised) else raised.relief
+    if shape is None:
+        raised = surface if _is_plane(surface) else reconstructed(surface, order)
+    else:
+        raised = by_shape(surface, shape, np.isin(surface.nodes, mesh.hanging.nodes))
+    return raised.relief if raised.relief and not is_flat(raised) else None
+
+
+def _is_plane(surface: FacetedSurface) -> bool:
+    """Return whether all nodes lie in one plane up to rounding; its mirror image begins at a crease."""
+    places, products = surface.points[surface.facets], corner_products(surface.points, surface.facets)
+    normal = products.sum(axis=(0, 1))
+    normal /= np.linalg.norm(normal) or 1.0
+    limit = FLAT * np.linalg.norm(edges_at_corners(places), axis=3).min() + computed_rounding(surface.points)
+    return bool(np.ptp(places @ normal) <= limit and np.all(products @ normal > 0.0))
 
 
 def is_flat(surface: FacetedSurface) -> bool:

@@ -23,7 +23,6 @@ from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.gallery.links import DesignSurface
 from fenics_contact.gallery.side import side_of
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.shapes.parametric import tensor_grid
 from fenics_contact.shapes.simple import SurfaceShape
 
@@ -204,7 +203,7 @@ class SurfaceDesign:
         width = TRANSITION * extent if self.transition is None else self.transition
         distance, _ = cKDTree(surface).query(mesh.points)
         far = distance > max(FAR * extent, width)
-        facets, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
+        facets, _ = mesh.boundary
         facets = facets[~cut[facets].all(axis=1).any(axis=1)]
         boundary = np.setdiff1d(facets, self.lattice.nodes)
         far[boundary] |= distance[boundary] > width

@@ -44,7 +44,6 @@ from fenics_contact.errors import InvalidDesignError, InvalidInputError, togethe
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.mesh.hanging import require_none
 from fenics_contact.results.fields import body_mesh
 from fenics_contact.results.state import State
@@ -276,7 +275,7 @@ def volume_by_points(mesh: BodyMesh, measure: Measure = PLAIN) -> np.ndarray:
 
     Moving the boundary by v changes the volume by ∫ v·n dA, so that only boundary nodes count.
     """
-    faces, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
+    faces, _ = mesh.boundary
     result = np.zeros_like(mesh.points)
     for at in gauss_points(mesh.points, faces, measure):
         np.add.at(result, faces, at.values[:, None] * at.normals[:, None])

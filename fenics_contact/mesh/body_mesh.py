@@ -23,6 +23,7 @@ from fenics_contact.mesh.checked_surfaces import check_range, checked_surfaces, 
 from fenics_contact.mesh.collapsed import check_collapsed, cut_into_linear, expanded, in_words, shapes_in
 from fenics_contact.mesh.faces import (
     LAST_BITS,
+    boundary_faces,
     check_no_coincident_nodes,
     coordinate_rounding,
 )
@@ -322,7 +323,8 @@ class BodyMesh:
             check_no_coincident_nodes(points)
         check_hanging(self.hanging, points, len(cells))
         check_centres(self.centres, points)
-        self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape, hanging=self.hanging))
+        outside = self.boundary[0] if self.surfaces else cells[:0]
+        self._set(surfaces=checked_surfaces(self.surfaces, outside, *points.shape))
         self._set(node_sets=checked_node_sets(self.node_sets, len(points), self.surfaces))
         self._set(_off_shapes=self._checked_shapes(self.shapes))
         if self.chart is not None:
@@ -562,6 +564,11 @@ class BodyMesh:
         if surface in self.node_sets:
             return nodes_to_hold(self.followers, surface, self.node_sets[surface])
         return nodes_to_hold(self.followers, surface, self.surfaces[surface])
+
+    @cached_property
+    def boundary(self) -> tuple[np.ndarray, np.ndarray]:
+        """Faces that belong to only one cell, and the cells that they belong to, see `boundary_faces`."""
+        return boundary_faces(self.cells, self.dim, self.hanging)
 
     @cached_property
     def linear(self) -> BodyMesh:

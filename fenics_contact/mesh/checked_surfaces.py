@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from fenics_contact._base.checks import check_each
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.faces import (
-    boundary_faces,
     check_on_boundary,
     corners_of,
     is_triangle,
@@ -19,7 +18,6 @@ from fenics_contact.mesh.faces import (
     start_at_smallest,
     widened,
 )
-from fenics_contact.mesh.hanging import NO_HANGING, HangingNodes
 
 
 def integers(values: ArrayLike, name: str) -> np.ndarray:
@@ -41,18 +39,10 @@ def check_range(nodes: np.ndarray, n_nodes: int, name: str) -> None:
 
 
 def checked_surfaces(
-    surfaces: Mapping[str, ArrayLike],
-    cells: np.ndarray,
-    n_nodes: int,
-    dim: int,
-    *,
-    hanging: HangingNodes = NO_HANGING,
+    surfaces: Mapping[str, ArrayLike], boundary: np.ndarray, n_nodes: int, dim: int
 ) -> dict[str, np.ndarray]:
-    """Return named facets, (n_facets, nodes of a facet) int64, outward boundary faces of the cells."""
+    """Return named facets, (n_facets, nodes of a facet) int64, which are faces of the boundary, outward."""
     checked: dict[str, np.ndarray] = {}
-    if not surfaces:
-        return checked
-    boundary = boundary_faces(cells, dim, hanging)[0]
     triangles = is_triangle(boundary)
     for name, facets in surfaces.items():
         array = integers(facets, f"surface '{name}'")

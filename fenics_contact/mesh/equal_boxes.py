@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces, vector_areas
+from fenics_contact.mesh.faces import vector_areas
 from fenics_contact.mesh.partition import box_partition, face_areas
 from fenics_contact.mesh.quality import cell_volumes
 
@@ -54,7 +54,8 @@ def equal_boxes(
         n = n[..., None] * along[-1]
         surface = surface[..., None] + 2.0 * cut
         differing = differing[..., None] + (count % along[-1] > 0)
-    volume = float(cell_volumes(mesh.points, mesh.cells).sum())
+    volumes = cell_volumes(mesh.points, mesh.cells)
+    volume = float(volumes.sum())
     c = surface / (2.0 * mesh.dim * n ** (1.0 / mesh.dim) * volume ** (1.0 - 1.0 / mesh.dim))
     cost = c * np.exp(size * np.abs(np.log(n / target)) + uneven * differing)
     cost[(n < first) | (n > last) | (c > slender) | (n < members * (1.0 + differing))] = np.inf
@@ -64,7 +65,7 @@ def equal_boxes(
         return None
     boxes = tuple(int(along[d][k]) for d, k in enumerate(best[1:]))
     partition = box_partition(mesh, boxes)
-    shapes, length = _shapes(mesh, partition)
+    shapes, length = _shapes(mesh, partition, volumes)
     return partition if np.prod(boxes) >= members * shapes and length <= longest else None
 
 
@@ -85,16 +86,15 @@ def _areas(
         # Where the grid closes on itself, the last layer has the first one behind it.
         closing = other[across, d] - first[across, d] > 1
         crossed.append(np.bincount(np.where(closing, count - 1, first[across, d]), areas[across], count))
-    outside = vector_areas(mesh.points, boundary_faces(mesh.cells, mesh.dim)[0])
+    outside = vector_areas(mesh.points, mesh.boundary[0])
     return crossed, np.linalg.norm(outside, axis=1).sum(keepdims=True)
 
 
-def _shapes(mesh: BodyMesh, partition: np.ndarray, places: int = 6) -> tuple[int, float]:
+def _shapes(mesh: BodyMesh, partition: np.ndarray, volumes: np.ndarray, places: int = 6) -> tuple[int, float]:
     """Return how many shapes subdomains have up to rotations and mirrors, and the largest second moment.
 
     Shapes are distinguished by volume and principal moments; that of a cube of the same volume is one.
     """
-    volumes = cell_volumes(mesh.points, mesh.cells)
     centres = mesh.points[mesh.cells].mean(axis=1)
     whole = np.bincount(partition, volumes)
     middle = np.stack([np.bincount(partition, volumes * x) / whole for x in centres.T], axis=1)

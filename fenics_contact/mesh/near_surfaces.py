@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces, corners_of, vector_areas
+from fenics_contact.mesh.faces import corners_of, vector_areas
 
 FACING = 0.5
 """Facets face each other if their normals are opposite within 60 degrees: smallest cosine of that angle."""
@@ -54,7 +54,7 @@ class _Side:
     """The boundary of a body, facet by facet."""
 
     def __init__(self, mesh: BodyMesh) -> None:
-        self.facets, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
+        self.facets, _ = mesh.boundary
         corners = mesh.points[corners_of(self.facets, mesh.dim)]
         self.centre = corners.mean(axis=1)
         self.radius = np.linalg.norm(corners - self.centre[:, None], axis=2).max(axis=1)

@@ -14,7 +14,7 @@ from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import CellType, cell_type_of, quadrature, shape_gradients
 from fenics_contact.mesh.collapsed import SHAPES, collapse, places_of, shapes_in
-from fenics_contact.mesh.faces import computed_rounding, corners_of
+from fenics_contact.mesh.faces import computed_rounding, coordinate_rounding, corners_of
 from fenics_contact.shapes.combined import Joined
 from fenics_contact.shapes.parametric import tensor_grid
 from fenics_contact.shapes.simple import Plane, SurfaceShape, evaluate_shape
@@ -72,12 +72,27 @@ def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | Non
         if groups := shapes_in(cells, cell.dim):
             return _of_shapes(points, cells, positions, groups)
     corners = places_of(points, cells)
+    if _are_parallelepipeds(corners, cell):
+        edges = corners[:, cell.edges[0]] - corners[:, :1]
+        return np.broadcast_to(determinants(edges)[:, None], (len(cells), len(positions)))
     columns = np.ascontiguousarray(corners.transpose(0, 2, 1)).reshape(-1, cells.shape[1])
     values = np.empty((cells.shape[0], positions.shape[0]))
     # A few positions, all cells at once, which keeps the arrays small.
     for m, gradients in enumerate(shape_gradients(cell, positions)):
         values[:, m] = determinants((columns @ gradients).reshape(-1, cell.dim, cell.dim))
     return values
+
+
+def _are_parallelepipeds(corners: np.ndarray, cell: CellType, straight: float = 1e-10) -> bool:
+    """Return whether all are linear parallelepipeds up to rounding: one Jacobian for each will do.
+
+    `straight`: how far corners may be off at most, relative to the longest edge at the first.
+    """
+    if cell.order > 1 or len(corners) == 0:
+        return False
+    edges = corners[:, cell.edges[0]] - corners[:, :1]
+    bent = np.abs(corners - corners[:, :1] - cell.vertices @ edges).max()
+    return bool(bent <= min(coordinate_rounding(corners), straight * np.abs(edges).max(axis=(1, 2)).min()))
 
 
 def _of_shapes(

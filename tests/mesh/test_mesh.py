@@ -148,6 +148,21 @@ def test_a_cell_that_is_inverted_only_between_its_vertices_is_reported(
         BodyMesh(points, cells)
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_parallelepipeds_have_the_jacobians_that_they_have_beside_bent_cells(dim: int) -> None:
+    """Alone they take one determinant each, beside others those of every place."""
+    mesh = rectangle((0, 0), (2, 3), (3, 2)) if dim == 2 else block((0, 0, 0), (2, 3, 1), (3, 2, 2))
+    points = mesh.points @ np.array([[1.0, 0.3, 0.2], [-0.4, 2.0, 0.1], [0.3, 0.0, 1.5]])[:dim, :dim] + 7.0
+    alone = jacobians(points, mesh.cells)
+    assert np.ptp(alone) == 0.0 or np.ptp(alone) < 1e-13 * alone.max()
+    points[mesh.cells[-1, -2]] += 0.1
+    beside = jacobians(points, mesh.cells)
+    untouched = ~(mesh.cells == mesh.cells[-1, -2]).any(axis=1)
+    assert untouched.any()
+    np.testing.assert_allclose(beside[untouched], alone[untouched], rtol=1e-13)
+    assert np.ptp(beside[-1]) > 1e-2 * beside[-1].max()
+
+
 def test_a_facet_inside_the_body_is_refused(parts: dict[str, Any]) -> None:
     inner = np.flatnonzero(parts["points"][:, 0] == 1.0)
     parts["surfaces"]["middle"] = inner[None, [0, 1, 3, 2]]

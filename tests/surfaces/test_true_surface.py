@@ -208,6 +208,19 @@ def test_flat_surfaces_have_no_relief() -> None:
         assert all(surface.relief is None for surface in known(mesh, name).values())
 
 
+@pytest.mark.parametrize("slope", [0.3, 1e-3, 1e-9])
+def test_a_plane_that_meets_its_mirror_image_at_an_angle_is_flat(slope: float) -> None:
+    straight = block((0, 0, 0), (1, 2, 1), (3, 4, 2))
+    inclined = straight.points + slope * straight.points[:, :1] * [0.0, 0.0, 1.0]
+    mesh = BodyMesh(inclined, straight.cells, straight.surfaces)
+    at_symmetry = np.zeros(mesh.points.shape, dtype=bool)
+    at_symmetry[:, 0] = mesh.points[:, 0] == 0.0
+    assert true_surface(mesh, "z1", "best", mirrored=at_symmetry).relief is None
+    inclined[:, 2] += 1e-6 * straight.points[:, 0] ** 2
+    bent = BodyMesh(inclined, straight.cells, straight.surfaces)
+    assert true_surface(bent, "z1", "best").relief is not None
+
+
 # Curves around plane bodies: outward normals, lengths, local coordinates; and what makes no surface.
 def disc(n: int, radius: float = 2.0) -> FacetedSurface:
     """The rim of a disc, counterclockwise, its nodes numbered among others."""
