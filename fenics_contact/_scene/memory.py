@@ -168,7 +168,7 @@ class Fit:
     """Memory that a state of a linear scene takes on a machine, and what the machine has left, [bytes].
 
     Attributes:
-        left: What may be taken, infinite where it is not known, or the scene is too small to matter.
+        left: What may be taken, infinite where it is not known, or there is more than enough.
         fast: What a state takes where subdomains are stored for speed.
         compact: That where each is stored as one triangle in single precision, `LocalKind.COMPACT`.
         roomy: Share of the memory that may be taken.
@@ -197,18 +197,19 @@ class Fit:
         comm: MPI.Comm,
         *,
         limit: float | None = None,
-        small: int = 50_000,
+        ample: float = 50e3,
     ) -> Fit:
         """Compute it from a partition. Collective; of the machines the one with the least memory counts.
 
         `counted`: returns the subdomains; `limit`: memory that a state may take on a machine, [bytes]; None:
-        what it has left; `small`: unknowns up to which nothing is computed without a limit.
+        what it has left; `ample`: bytes for each unknown, more than any scene takes; where they are left,
+        nothing is computed without a limit.
         """
         with together(comm):
             _check_limit(limit)
-        if limit is None and _unknowns(scene) <= small:
-            return cls()
         ranks = ranks_of_machine(comm).size
+        if limit is None and comm.allreduce(ample * _unknowns(scene) <= _left(ranks), MPI.LAND):
+            return cls()
         share = ranks / comm.size
         parts = once_a_machine(comm, counted)
         with together(comm):
