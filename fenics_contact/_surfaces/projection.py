@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._surfaces.facets import FacetedSurface, heights, outside, shape_functions
 from fenics_contact._surfaces.pieces import shape_weights
-from fenics_contact.mesh.faces import coordinate_rounding, widened
+from fenics_contact.mesh.faces import coordinate_rounding, vector_areas, widened
+from fenics_contact.mesh.quality import determinants
 
 #: A facet is tried in the second round if its bounding ball is as near as the nearest centroid times this.
 REACH = 1.1
@@ -93,7 +94,7 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     corners, rounding = master.points[master.facets], coordinate_rounding(master.points)
     tree = cKDTree(corners.mean(axis=1))
     radius = np.linalg.norm(corners - tree.data[:, None], axis=2).max(axis=1)
-    near = _solve(points, normals, master, *nearest_facets(tree, points), rounding)
+    near = _in_nearest(points, normals, master, tree, rounding)
     projection = best_projections(near.part(near.beside == 0.0), rounding)
     waiting = np.setdiff1d(np.arange(len(points)), projection.point)
     if len(waiting):
@@ -103,11 +104,59 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     return replace(projection, gap=gap, lost=np.setdiff1d(projection.lost, projection.point))
 
 
+def _in_nearest(
+    points: np.ndarray, normals: np.ndarray, master: FacetedSurface, tree: cKDTree, rounding: float
+) -> Projection:
+    """Project points on the facets whose centroids are nearest, but for those that cannot be the closest.
+
+    First each on the facet that it is nearest to, then on three more, then on the others: facets that are
+    farther away than its projection are left out.
+    """
+    point, facet = nearest_facets(tree, points)
+    least = _least_distances(points, master, facet)
+    order = np.argsort(least, axis=1, kind="stable")
+    facet, least = (np.take_along_axis(each, order, axis=1) for each in (facet, least))
+    reach, found = np.full(len(points), np.inf), list[Projection]()
+    for some in np.split(np.arange(facet.shape[1]), (1, 4)):
+        near = least[:, some] <= reach[:, None]
+        found.append(_solve(points, normals, master, point[:, some][near], facet[:, some][near], rounding))
+        inside = found[-1].part(found[-1].beside == 0.0)
+        np.minimum.at(reach, inside.point, np.abs(inside.gap) + 2.0 * rounding)
+    return join(found)
+
+
+def _least_distances(
+    points: np.ndarray, master: FacetedSurface, facet: np.ndarray, slack: float = 1e-6
+) -> np.ndarray:
+    """Return bounds below the distances of points from some facets each, shape (n, facets), [length].
+
+    Facets lie inside planes through their edges, and between one above and one below them. `slack`:
+    relative, for rounding and projections barely outside a facet.
+    """
+    corners = master.points[master.facets]
+    middle, above = corners.mean(axis=1), _unit(vector_areas(master.points, master.facets))[:, None]
+    along = np.roll(corners, -1, axis=1) - corners
+    out = np.concatenate([_unit(along if master.dim == 2 else np.cross(along, above)), above, -above], axis=1)
+    ends = (1.0 + slack) * np.einsum("fkd,fcd->fkc", out, corners - middle[:, None]).max(axis=2)
+    # Facets last: what follows are sums of few long arrays.
+    last = (np.asfortranarray(each).T.take(facet, axis=-1) for each in (out, ends, middle))
+    directions, farthest, start = last
+    away = np.einsum("dknf,dnf->knf", directions, points.T[:, :, None] - start) - farthest
+    beside, over = (np.maximum(each.max(axis=0), 0.0) for each in (away[:-2], away[-2:]))
+    return np.asarray((1.0 - slack) * np.hypot(beside, over))
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors of length one along others; zero where these are."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0.0, length, 1.0))
+
+
 def nearest_facets(tree: cKDTree, points: np.ndarray, nearest: int = 9) -> tuple[np.ndarray, np.ndarray]:
-    """Pair every point with the facets whose centroids are nearest: numbers of points and of facets."""
+    """Pair points with the facets whose centroids are nearest: numbers of both, shape (n, facets)."""
     ranks = np.arange(min(nearest, tree.n)) + 1
     _, facets = tree.query(points, k=ranks)
-    return np.repeat(np.arange(len(points)), len(ranks)), facets.ravel()
+    return np.repeat(np.arange(len(points))[:, None], len(ranks), axis=1), facets
 
 
 def facets_in_reach(
@@ -148,10 +197,13 @@ def _solve(
     corner_normals = master.normals[nodes]
     size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
     local = np.full((len(point), master.dim - 1), 1 / 3 if master.corners == 3 else 0.0)
+    # Pairs come last in memory: what follows are sums of few long arrays.
+    corners, corner_normals, target, local = map(np.asfortranarray, (corners, corner_normals, target, local))
     gap = np.zeros(len(point))
     at = np.arange(len(point))  # the pairs still iterating
     for count in range(NEWTON_STEPS):
-        step = _newton_step(corners[at], corner_normals[at], target[at], local[at], gap[at], size[at])
+        pairs = (each.T.take(at, axis=-1).T for each in (corners, corner_normals, target, local, gap, size))
+        step = _newton_step(*pairs)
         # A point far beyond the facet belongs to another one; limiting it keeps its iterates finite.
         local[at] = np.clip(local[at] + step[:, :-1], -3, 3)
         gap[at] += step[:, -1]
@@ -179,7 +231,7 @@ def _local_rounding(matrix: np.ndarray, rounding: float) -> np.ndarray:
     # Entries of the inverse are bounded by the product of all but one column norms over the determinant.
     tangents = np.linalg.norm(matrix[:, :, :-1], axis=1)
     cofactor = tangents.max(axis=1) if matrix.shape[1] == 3 else np.ones(len(matrix))
-    return np.asarray(rounding * cofactor / np.maximum(np.abs(np.linalg.det(matrix)), 1e-300))
+    return np.asarray(rounding * cofactor / np.maximum(np.abs(determinants(matrix)), 1e-300))
 
 
 def _newton_step(
@@ -191,11 +243,11 @@ def _newton_step(
     size: np.ndarray,
 ) -> np.ndarray:
     """Return the changes of (ξ, g), shape (n, dim); zero where the facet and its normals are degenerate."""
-    values, derivatives = shape_functions(local, corners.shape[1])
+    values, derivatives = map(np.asfortranarray, shape_functions(local, corners.shape[1]))
     normal, length = interpolated_normal(values, normals)
     residual = np.einsum("nk,nkd->nd", values, corners) + gap[:, None] * normal - target
     matrix = newton_matrix(corners, normals, derivatives, gap, normal, length)
-    regular = np.abs(np.linalg.det(matrix)) > 1e-12 * size ** (matrix.shape[1] - 1)
+    regular = np.abs(determinants(matrix)) > 1e-12 * size ** (matrix.shape[1] - 1)
     matrix[~regular] = np.eye(matrix.shape[1])
     return np.where(regular[:, None], -np.linalg.solve(matrix, residual[:, :, None])[:, :, 0], 0.0)
 

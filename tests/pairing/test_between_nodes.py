@@ -12,12 +12,15 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import (
+    Body,
+    ContactPair,
     ContactProblem,
     Coulomb,
     RigidSphere,
     RigidTool,
     Scene,
     Support,
+    Surface,
     solve_scene,
     solve_to,
 )
@@ -26,7 +29,9 @@ from fenics_contact._equilibrium.between_nodes import ALONE, SHARE, between_node
 from fenics_contact._equilibrium.steps import stored_state
 from fenics_contact._pairing.inside import InFacets, deepest_points
 from fenics_contact._pairing.sliding.contact import SlidingContact
-from fenics_contact.materials import J2Plasticity, PlaneStrain
+from fenics_contact._surfaces import projection
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity, J2Plasticity, PlaneStrain
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.resolution import CALL, BetweenNodes
 from tests.pairing.between_nodes import (
@@ -81,6 +86,23 @@ def test_where_samples_show_that_little_is_missed_nobody_looks_further(
         assert again.doubt("here") == missed.doubt("here")
     assert found[0] == (False, False)
     assert found[-1][1]
+
+
+def test_samples_are_projected_on_hardly_more_than_one_facet_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    lower, upper = block((0, 0, 0), (3, 3, 1), (5, 5, 1)), block((0, 0, 1), (3, 3, 2), (7, 7, 1))
+    steel = IsotropicElasticity(2.1e5, 0.3)
+    scene = Scene(
+        {"lower": Body(lower, steel), "upper": Body(upper, steel)},
+        supports=[Support("lower", "z0"), Support("upper", "z1", (0.0, 0.0, -1e-3))],
+        contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"))],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-8)
+    solve, tried = projection._solve, []
+    monkeypatch.setattr(projection, "_solve", lambda *of: tried.append(of[3]) or solve(*of))
+    assert between_nodes(replace(state, missed={}), 0, 1e-3) is None
+    samples = len(np.unique(np.concatenate(tried)))
+    assert samples > 1000
+    assert sum(map(len, tried)) < 1.2 * samples
 
 
 def test_fine_meshes_touch_at_nodes(caplog: pytest.LogCaptureFixture) -> None:

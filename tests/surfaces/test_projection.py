@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
+from fenics_contact._surfaces import projection as searched
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, quadrature_areas, shape_functions
 from fenics_contact._surfaces.projection import Projection, project
 from fenics_contact.errors import InvalidInputError
@@ -298,6 +300,81 @@ def test_of_facets_that_share_a_point_the_first_is_taken(corners: int, size: flo
     lowest = np.array([np.argmax((flat.facets == node).any(axis=1)) for node in range(len(flat.points))])
     np.testing.assert_array_equal(found.facet, np.concatenate([lowest, facet_of_side[first]]))
     np.testing.assert_allclose(found.gap, 0.03 * size, rtol=1e-12 + 1e-14 * shift)
+
+
+# Facets that are too far away are not tried, and no projection is another one for that.
+
+
+def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Number of facets on which points are projected, one entry a call."""
+    solve, counts = searched._solve, []
+
+    def counting(*of: Any) -> Projection:
+        counts.append(len(of[3]))
+        return solve(*of)
+
+    monkeypatch.setattr(searched, "_solve", counting)
+    return counts
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+@pytest.mark.parametrize(("height", "most"), [(0.0, 1.1), (1e-3, 1.1), (0.05, 2.0), (0.3, 5.0)])
+def test_points_near_a_surface_are_projected_on_hardly_more_than_one_facet(
+    corners: int, height: float, most: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    surface, rng, counts = cap(sphere, 12, corners), np.random.default_rng(5), tried(monkeypatch)
+    places = np.column_stack([rng.uniform(-0.5, 0.5, (400, 2)), np.ones(400)])
+    places[:, 2] = sphere(*places[:, :2].T)
+    assert len(project((1.0 + height) * places, -places, surface).point) == 400
+    assert sum(counts) < most * 400
+
+
+def rough(corners: int, rng: np.random.Generator, bumps: float) -> FacetedSurface:
+    """Uneven facets over uneven ground, graded, turned, and anywhere."""
+    ticks = np.sort(rng.uniform(0.0, 1.0, 9)) + 0.02 * np.arange(9)
+    if corners == 2:
+        points = np.column_stack([ticks, bumps * rng.uniform(-1.0, 1.0, 9)])
+        return faceted_surface(points + rng.normal(size=2), np.column_stack([np.arange(1, 9), np.arange(8)]))
+    x, y = np.meshgrid(ticks, np.sort(rng.uniform(0.0, 1.0, 9)) + 0.02 * np.arange(9), indexing="ij")
+    x, y = x + 0.01 * rng.uniform(-1, 1, x.shape), y + 0.01 * rng.uniform(-1, 1, x.shape)
+    surface = lattice(x, y, bumps * rng.uniform(-1.0, 1.0, x.shape), corners)
+    turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+    return faceted_surface(
+        surface.points @ (turn * np.sign(np.linalg.det(turn))).T + rng.normal(size=3), surface.facets
+    )
+
+
+@pytest.mark.parametrize("bumps", [0.0, 1e-3, 0.03, 0.2])
+@pytest.mark.parametrize("corners", [2, 3, 4])
+def test_no_facet_is_left_out_that_would_have_the_projection(
+    corners: int, bumps: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also at nodes and edges, beyond the rim, deep inside, far above, and on creases as high as wide."""
+    rng, found = np.random.default_rng(6), []
+    cases = []
+    for _ in range(5):
+        surface = rough(corners, rng, bumps)
+        facet = rng.integers(0, len(surface.facets), 300)
+        weights = rng.dirichlet(np.ones(corners), 300)
+        weights[:100] = np.round(weights[:100])  # many at nodes
+        weights[:100] += weights[:100].sum(axis=1, keepdims=True) == 0.0
+        weights /= weights.sum(axis=1, keepdims=True)
+        normals = np.einsum("nk,nkd->nd", weights, surface.normals[surface.facets[facet]])
+        places = np.einsum("nk,nkd->nd", weights, surface.points[surface.facets[facet]])
+        away = rng.choice([0.0, 1e-9, 1e-4, 0.01, 0.1, 0.5], 300) * rng.choice([-1.0, 1.0], 300)
+        cases.append((places + away[:, None] * (normals + 0.3 * rng.normal(size=normals.shape)), -normals))
+        found.append((surface, project(*cases[-1], surface)))
+    counts = tried(monkeypatch)
+    for case, (surface, _) in zip(cases, found, strict=True):
+        project(*case, surface)
+    few = sum(counts)
+    monkeypatch.setattr(searched, "_least_distances", lambda points, master, facet: np.zeros(facet.shape))
+    for case, (surface, few_tried) in zip(cases, found, strict=True):
+        every = project(*case, surface)
+        for name in ("point", "facet", "local", "gap", "normal", "beside", "lost"):
+            both = getattr(few_tried, name), getattr(every, name)
+            np.testing.assert_allclose(*both, rtol=0.0, atol=1e-13, err_msg=name)
+    assert few < 0.7 * (sum(counts) - few), "hardly a facet was left out"
 
 
 def test_a_node_without_a_normal_is_named_by_its_place() -> None:

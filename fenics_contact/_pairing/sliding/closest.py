@@ -127,7 +127,7 @@ class ClosestPoints:
         distance, _ = tree.query(targets[waiting])
         waiting = waiting[distance <= self.reach + 2 * radius.max()]
         pair, facet = nearest_facets(tree, targets[waiting])
-        near = self._from_middles(targets, normals, waiting[pair], facet)
+        near = self._from_middles(targets, normals, waiting[pair].ravel(), facet.ravel())
         near = best_projections(near.part(near.beside == 0.0), rounding)
         still = np.setdiff1d(waiting, near.point)
         reached = self._from_middles(targets, normals, *facets_in_reach(tree, radius, targets, still))
