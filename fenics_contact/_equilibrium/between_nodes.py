@@ -114,10 +114,15 @@ def _missed(state: State, number: int, least: float) -> tuple[Missed | None, flo
         bodies = isinstance(pair.master, Surface)
         known = not (scene.deforms_much and _presses(state, number) and bodies)
         facets = _near(state, inside, number) if known else np.zeros(0, dtype=np.int64)
+    facets = comm.bcast(facets)
     displaced = _displaced(state, inside, facets)
     with together(comm):
+        mine = facets[comm.rank :: comm.size]
+        parts = [Sampled.of(inside.slave.corners, mine, _gaps(inside, displaced))] if len(mine) else []
+    parts = [part for some in comm.allgather(parts) for part in some]
+    with together(comm):
         if comm.rank == 0 and len(facets):
-            sampled, found = Sampled.of(inside.slave.corners, facets, _gaps(inside, displaced)), (None, least)
+            sampled, found = Sampled.join(parts), (None, least)
             if len(sampled.may_miss(least)):
                 found = _deepest(inside, undeformed, number, sampled, displaced), 0.0
     return comm.bcast(found)

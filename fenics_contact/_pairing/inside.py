@@ -8,7 +8,7 @@ not have derivatives, and near their minimum they hardly change.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import ClassVar
 
@@ -97,13 +97,20 @@ class Sampled:
     @classmethod
     def of(cls, corners: int, facet: np.ndarray, gaps_at: GapsAt) -> Sampled:
         """Return those of facets with so many corners; `gaps_at`: gaps at their points."""
-        found, at_ends = (
-            _on_all(gaps_at, facet, places) for places in (_samples(corners), corner_places(corners))
-        )
-        every = np.concatenate([found, at_ends], axis=1)
+        places = np.concatenate([_samples(corners), corner_places(corners)])
+        every = gaps_at(np.repeat(facet, len(places)), np.tile(places, (len(facet), 1)))
+        every = every.reshape(len(facet), len(places))
+        found, at_ends = np.split(every, [-corners], axis=1)
         finite = np.where(np.isfinite(every), every, np.nan)
         highest, lowest = (of(finite, axis=1, initial=0.0) for of in (np.nanmax, np.nanmin))
         return cls(facet, found, np.nan_to_num(highest - lowest), at_ends.min(axis=1, initial=np.inf))
+
+    @classmethod
+    def join(cls, parts: Sequence[Sampled]) -> Sampled:
+        """Return those of several groups of facets, at least one."""
+        order = np.argsort(np.concatenate([part.facet for part in parts]))
+        names = [each.name for each in fields(cls)]
+        return cls(*(np.concatenate([getattr(part, name) for part in parts])[order] for name in names))
 
     def may_miss(self, least: float) -> np.ndarray:
         """Return which facets may lie deeper than their corners by more than a depth, shape (k,).
@@ -132,12 +139,6 @@ def deepest_points(corners: int, sampled: Sampled, gaps_at: GapsAt, least: float
     local, gap = _descended(corners, facet, gaps_at, local, gap, 1e-3 * FLAT * varies)
     result = Deepest(facet, local, gap, sampled.at_nodes[near])
     return result.part(result.missed > least)
-
-
-def _on_all(gaps_at: GapsAt, facet: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the gaps at the same places of all facets, shape (n, m)."""
-    count = len(places)
-    return gaps_at(np.repeat(facet, count), np.tile(places, (len(facet), 1))).reshape(len(facet), count)
 
 
 def _samples(corners: int) -> np.ndarray:
