@@ -45,7 +45,9 @@ def _subdomains(state: State, body: str) -> Iterator[tuple[np.ndarray, np.ndarra
         if own.body == body:
             order = np.argsort(own.nodes)
             nodes = own.nodes[order]
-            corners = np.searchsorted(nodes, cells[np.isin(parents, own.cells)])
+            held = np.zeros(len(mesh.cells), dtype=bool)
+            held[own.cells] = True
+            corners = np.searchsorted(nodes, cells[held[parents]])
             yield mesh.points[nodes], state.torn_displacement[part].reshape(len(nodes), -1)[order], corners
 
 

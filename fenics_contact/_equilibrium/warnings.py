@@ -13,7 +13,11 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
-from fenics_contact._equilibrium.between_nodes import between_nodes, more_press_than_a_facet_has
+from fenics_contact._equilibrium.between_nodes import (
+    between_nodes,
+    displaced_at,
+    more_press_than_a_facet_has,
+)
 from fenics_contact._equilibrium.corners_inside import corner_between_nodes
 from fenics_contact._equilibrium.peaks import coarse_peak, unmatched_nodes
 from fenics_contact._equilibrium.turning import Turning
@@ -219,7 +223,10 @@ class ContactWarnings:
         reach = max(comm.allgather(float(np.linalg.norm(moved, axis=1).max(initial=0.0))))
         near = bodies_near(scene, reach)
         names = sorted({name for both in near for name in both})
-        displacement = {name: state.gather_displacement(name)[:, : scene.dim] for name in names}
+        numbers = NodeNumbers.of(scene)
+        own = {name: numbers.global_nodes(name, np.arange(scene.bodies[name].mesh.n_nodes)) for name in names}
+        every = displaced_at(state, np.concatenate([np.zeros(0, dtype=np.int64), *own.values()]))
+        displacement = {name: every[nodes] for name, nodes in own.items()}
         share = slice(comm.rank, None, comm.size)
         with together(comm):
             outlines = {name: self._outline(scene, name) for name in names}

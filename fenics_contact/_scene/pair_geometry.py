@@ -488,14 +488,17 @@ def unpaired(
     """
     named = _named(scene, both)
     counts, deep = np.zeros(3, dtype=int), least_depth * reach
+    # Nodes come last in memory, of which there are many.
+    first = {name: np.asfortranarray(scene.bodies[name].mesh.points) for name in both}
+    last = {name: np.asfortranarray(first[name] + moved[name]) for name in both}
     for body, into in (both, both[::-1]):
-        before, wall = scene.bodies[body].mesh.points, scene.bodies[into].mesh.points
+        before, wall, after, passed = first[body], first[into], last[body], last[into]
         facets, behind, _ = outlines[body]
         by_name = np.all(np.isin(facets, named[body]), axis=1)
         own, mine = (facets[by_name], behind[by_name]), np.flatnonzero(~by_name)[share]
-        after, passed, cells = before + moved[body], wall + moved[into], outlines[into][2]
-        near, met = _near(before[facets[mine]], deep, wall, cells)
-        for each in zip((near, met), _near(after[facets[mine]], deep, passed, cells), strict=True):
+        corners, cells = facets[mine].T, outlines[into][2]
+        near, met = _near(before[corners], deep, wall, cells)
+        for each in zip((near, met), _near(after[corners], deep, passed, cells), strict=True):
             np.logical_or(*each, out=each[0])
         if not near.any():
             continue
@@ -516,19 +519,19 @@ def _near(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return marks of the facets that may lie in cells or touch them, and of these cells; no others do.
 
-    `facets`: their corners, shape (n, corners, dim), [length]; `deep`: how far below them their middles are
+    `facets`: their corners, shape (corners, n, dim), [length]; `deep`: how far below them their middles are
     looked for, [length]. Boxes around cells decide.
     """
-    middle, size = facets.mean(axis=1), np.ptp(facets, axis=1).max(axis=1, initial=0.0)
+    middle, size = facets.mean(axis=0), np.ptp(facets, axis=0).T.copy().max(axis=0, initial=0.0)
     slack = deep + 2.0 * OVERLAPPING * size  # more than they need, which covers rounding
-    near, met = np.zeros(len(facets), dtype=bool), np.zeros(len(cells), dtype=bool)
+    near, met = np.zeros(len(middle), dtype=bool), np.zeros(len(cells), dtype=bool)
     meet = (middle >= points.min(axis=0) - slack[:, None]) & (middle <= points.max(axis=0) + slack[:, None])
     first = np.flatnonzero(meet.all(axis=1))
     if not len(first):
         return near, met
     middle, slack = middle[first], slack[first]
     low, high = (middle - slack[:, None]).min(axis=0), (middle + slack[:, None]).max(axis=0)
-    beyond = np.packbits(np.concatenate([points < low, points > high], axis=1), axis=1)[:, 0]
+    beyond = np.packbits([*(points.T < low[:, None]), *(points.T > high[:, None])], axis=0)[0]
     other = np.flatnonzero(np.bitwise_and.reduce(beyond[cells.T], axis=0) == 0)
     corners = points[cells[other]]
     low, high = corners.min(axis=1), corners.max(axis=1)
@@ -643,9 +646,11 @@ def _in_simplices(
     place = np.concatenate([*close, np.zeros(0)]).astype(np.int64)
     start, sides = corners[:, 0], np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     simplex = np.repeat(np.arange(len(corners)), count)
+    slack, at = 1e-6 * radius[:, None], places[place]
+    low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
     # Simplices that are flat to rounding hold nothing.
     full = np.abs(determinants(sides / radius[:, None, None])) > LAST_PLACES
-    kept = full[simplex]
+    kept = full[simplex] & ((at >= low[simplex]) & (at <= high[simplex])).all(axis=1)
     place, simplex = place[kept], simplex[kept]
     rest = np.linalg.solve(sides[simplex], (places[place] - start[simplex])[..., None])[..., 0]
     inside[place[np.minimum(rest.min(axis=1), 1.0 - rest.sum(axis=1)) >= border]] = True

@@ -30,8 +30,8 @@ def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.nda
     """Return the same mean of a torn field at some nodes, on all ranks. Collective."""
     tearing = decomposition.tearing
     place, copy, block = decomposition.copies_here(nodes)
-    total = np.zeros((len(nodes), tearing.components))
-    np.add.at(total, place, tearing.copy_share[copy, None] * field.reshape(-1, tearing.components)[block])
+    parts = tearing.copy_share[copy] * field.reshape(-1, tearing.components)[block].T
+    total = np.stack([np.bincount(place, each, len(nodes)) for each in parts], axis=1)
     return np.asarray(decomposition.comm.allreduce(total))
 
 

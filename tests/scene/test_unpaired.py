@@ -37,7 +37,7 @@ def counted(
         facets: np.ndarray, deep: float, points: np.ndarray, cells: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         left_out.append(np.count_nonzero(~near(facets, deep, points, cells)[0]))
-        return np.ones(len(facets), dtype=bool), np.ones(len(cells), dtype=bool)
+        return np.ones(facets.shape[1], dtype=bool), np.ones(len(cells), dtype=bool)
 
     with monkeypatch.context() as patched:
         patched.setattr(pair_geometry, "_near", all_of_them)
