@@ -41,14 +41,13 @@ def _subdomains(state: State, body: str) -> Iterator[tuple[np.ndarray, np.ndarra
     """Return of each of this rank's subdomains of a body its nodes, their displacements, and linear cells."""
     decomposition, mesh = state.torn.decomposition, state.scene.bodies[body].mesh
     cells, parents = mesh.linear.cells, mesh.cells_cut
+    place, held = np.zeros(mesh.n_nodes, dtype=np.int64), np.zeros(len(mesh.cells), dtype=bool)
     for own, part in zip(decomposition.meshes, decomposition.parts, strict=True):
         if own.body == body:
-            order = np.argsort(own.nodes)
-            nodes = own.nodes[order]
-            held = np.zeros(len(mesh.cells), dtype=bool)
-            held[own.cells] = True
-            corners = np.searchsorted(nodes, cells[held[parents]])
-            yield mesh.points[nodes], state.torn_displacement[part].reshape(len(nodes), -1)[order], corners
+            place[own.nodes], held[own.cells] = np.arange(len(own.nodes)), True
+            corners = place[cells[held[parents]]]
+            held[own.cells] = False
+            yield mesh.points[own.nodes], state.torn_displacement[part].reshape(len(own.nodes), -1), corners
 
 
 def gradient_squares(

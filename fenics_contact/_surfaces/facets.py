@@ -550,7 +550,8 @@ def heights(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> He
         shape = (len(facet), surface.corners, 2)
         return Heights(np.zeros(len(facet)), np.zeros(local.shape), np.zeros(shape))
     slope, d_slope, rest, d_rest = height_functions(local, surface.corners)
-    at_corners = slopes(surface, facet)
+    some, place = np.unique(facet, return_inverse=True)
+    at_corners = slopes(surface, some)[place]
     if relief.offsets is not None:
         ends = relief.offsets[facet]
         at_corners = at_corners - edges_at_corners(ends[..., None])[..., 0]
