@@ -198,15 +198,15 @@ class FaceNewton:
     Coulomb's law the slip bound is updated in every step, and the friction of slipping discs grows with the
     normal force within the step: a single loop.
 
-    Floating bodies come to rest before the first step, from nothing without friction alone, and after every
-    one (`RigidMotionCorrection`): their motions balance the load with the forces of the next guess. Three
-    further safeguards keep the active set from cycling. A disc whose friction force would turn by more than a
-    right angle has too large a ρ, which is reduced until the force keeps its direction or the disc sticks. A
-    step that is worse than the last two iterates is shortened, at no cost in products. Steps without progress
-    are followed by a rescue from the best iterate so far, by proximal points, whose convex potential a line
-    search descends (`qp.rescue`), or without a preconditioner by SMALSE where bodies float; the history
-    reports whether the active set cycled or the residual stagnated. No result is accepted before its
-    residuals are recomputed.
+    Floating bodies come to rest before the first step and after every one (`RigidMotionCorrection`): their
+    motions balance the load with the forces of the next guess. A cold start knows nothing of contact; its
+    first slip bounds follow these forces. Three further safeguards keep the active set from cycling. A disc
+    whose friction force would turn by more than a right angle has too large a ρ, which is reduced until the
+    force keeps its direction or the disc sticks. A step that is worse than the last two iterates is
+    shortened, at no cost in products. Steps without progress are followed by a rescue from the best iterate
+    so far, by proximal points, whose convex potential a line search descends (`qp.rescue`), or without a
+    preconditioner by SMALSE where bodies float; the history reports whether the active set cycled or the
+    residual stagnated. No result is accepted before its residuals are recomputed.
 
     Attributes:
         tolerance: Every residual of `Residuals` ends below it.
@@ -359,16 +359,14 @@ class _Run:
         products = 10 * parameters.rescue_products
         rough = replace(parameters, tolerance=parameters.doubt_tolerance, max_products=products)
         rescue = Rescue(problem, forcing, most, parameters.rescue)
-        # From nothing, bodies without friction would come to rest where friction holds them elsewhere.
-        rubs = global_max(problem.comm, float(problem.layout.n_friction)) > 0.0
-        if not (start.cold and rubs):
-            start = replace(start, iterate=steps.at_rest(start.iterate))
+        start = replace(start, iterate=steps.at_rest(start.iterate))
         return cls(parameters, problem, start, steps, rescue, FrictionAlone(problem, rough.run))
 
     def init(self) -> _State:
         """Return the state before the first step."""
         first = self.start.iterate
-        return _State(self.steps.init(first), first, self.start.memory)
+        begin = self.steps.from_rest if self.start.cold else self.steps.init
+        return _State(begin(first), first, self.start.memory)
 
     def terminate(self, state: _State) -> DualSolution | None:
         """Return the certified solution, None if a further step is needed. Collective."""

@@ -268,6 +268,10 @@ class FaceState:
     earlier: tuple[Residuals, ...] = ()
     fraction: float = 1.0
 
+    def pressing(self, problem: DualProblem) -> Vector:
+        """Return the multiplier whose normal forces slip bounds follow, that of the iterate."""
+        return self.iterate.multiplier
+
     def stall(self, comm: MPI.Comm) -> str:
         """Describe why the last steps made no progress: a cycling or a stationary active set. Collective."""
         if len(self.faces) < 2:
@@ -280,6 +284,16 @@ class FaceState:
         if not np.all(changed):
             return f"the active set cycles with period {int(np.argmin(changed)) + 1}, {flickering}"
         return f"the active set does not settle, {flickering}"
+
+
+@dataclass(frozen=True, eq=False)
+class RestedState(FaceState):
+    """The state before the first step from nothing: the multiplier does not depend on what touches."""
+
+    def pressing(self, problem: DualProblem) -> Vector:
+        """Return the trial multiplier, by which floating bodies came to rest, w = λ − ρ r."""
+        trial = self.iterate.multiplier - self.step * self.iterate.residual
+        return problem.compliance.pressed(trial, self.step)
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,6 +356,11 @@ class FaceSteps:
         """Return the state before the first step."""
         return FaceState(iterate, self.natural_step)
 
+    def from_rest(self, iterate: Iterate) -> FaceState:
+        """Return the state before the first step from nothing; where nothing floats, nothing came to rest."""
+        kind = RestedState if self.correction.motions.size else FaceState
+        return kind(iterate, self.natural_step)
+
     def at_rest(self, iterate: Iterate) -> Iterate:
         """Return an iterate of another load or position with floating bodies in equilibrium. Collective."""
         problem = self.problem
@@ -353,7 +372,8 @@ class FaceSteps:
         """Take one step and return the state after it with its line of history. Collective."""
         before = state.iterate
         # (b) The face that the natural map selects, and the number of status changes since the last one.
-        step, face = self._next_face(state)
+        pressing = state.pressing(self.problem)
+        step, face = self._next_face(state, pressing)
         count = face.changes(state.faces[0]) if state.faces else 0
         changed = round(float(global_sum(self.problem.comm, count)[0]))
         # (a), (c) Its solution, as accurate as the last face's prediction warrants.
@@ -361,7 +381,7 @@ class FaceSteps:
         tolerance = self.forcing.by_prediction(before.residuals, mismatch, care)
         if self.problem.exact is not None:
             tolerance = max(tolerance, self.safeguards.rounded * before.residuals.worst)
-        solved = self._solve(face, before, tolerance, predicted=not changed)
+        solved = self._solve(face, before, pressing, tolerance, predicted=not changed)
         # (d) Rigid motions, then the damped step.
         alpha = self._motions(solved, before, step)
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
@@ -378,10 +398,10 @@ class FaceSteps:
         following = FaceState(taken.point, step, faces, mismatch, (before.residuals,), taken.fraction)
         return following, self._record(number, taken, solved, changed)
 
-    def _next_face(self, state: FaceState) -> tuple[Vector, Face]:
+    def _next_face(self, state: FaceState, pressing: Vector) -> tuple[Vector, Face]:
         """Classify, with a smaller ρ for discs whose force would otherwise reverse."""
         layout, iterate = self.problem.layout, state.iterate
-        bound = self.problem.law.bound(iterate.multiplier)
+        bound = self.problem.law.bound(pressing)
         soft = self.problem.compliance
         face = classify(layout, bound, iterate.multiplier, iterate.residual, state.step, soft)
         if not state.faces or not self.safeguards.adapts_step:
@@ -391,16 +411,17 @@ class FaceSteps:
         step[layout.tangential[turned]] *= self.safeguards.reduction
         return step, classify(layout, bound, iterate.multiplier, iterate.residual, step, soft)
 
-    def _solve(self, face: Face, before: Iterate, tolerance: float, *, predicted: bool) -> _SolvedFace:
+    def _solve(
+        self, face: Face, before: Iterate, pressing: Vector, tolerance: float, *, predicted: bool
+    ) -> _SolvedFace:
         """Solve the linear system of a face, in which slipping forces grow with normal forces. Collective.
 
-        `predicted`: whether the tolerance is by a prediction of the face, which may turn out wrong: it is
-        solved no further than other residuals allow.
+        `pressing`: multiplier of the slip bounds; `predicted`: whether the tolerance is by a prediction of
+        the face, which may turn out wrong: it is solved no further than other residuals allow.
         """
         problem = self.problem
         system = self.systems.build(face)
-        growth = problem.law.growth(before.multiplier)
-        linear = couple(system, problem.coarse, growth, before.multiplier) or system
+        linear = couple(system, problem.coarse, problem.law.growth(pressing), pressing) or system
         # Onto the face and into equilibrium; the Krylov method preserves both.
         entered = linear.enter(before.multiplier)
         product = before.product + apply_unless_zero(problem, self.operator, entered - before.multiplier)

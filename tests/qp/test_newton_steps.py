@@ -76,6 +76,24 @@ def test_a_step_from_the_same_state_is_the_same_step() -> None:
     assert state.iterate.residuals.worst < 0.1
 
 
+def test_first_slip_bounds_follow_the_forces_by_which_bodies_come_to_rest() -> None:
+    dual = problem()
+    operator = CountedOperator(dual.operator)
+    steps = FaceSteps.build(dual, operator, Forcing(0.25, 0.1, 1e-8), 1000)
+    far, layout = dual.coarse.particular(), dual.layout
+    resting = steps.at_rest(iterate_fitted(dual, far, operator(far)))
+    state, _ = steps.step(steps.from_rest(resting), 0)
+    trial = (far - steps.natural_step * resting.residual)[layout.tangential_frictional]
+    bound = state.faces[0].slip_bound
+    assert 0 < np.count_nonzero(bound) < len(bound)
+    assert bound == pytest.approx(0.3 * np.maximum(trial, 0.0), abs=1e-14 * bound.max())
+    assert not np.allclose(bound, dual.law.bound(far), atol=0.1 * bound.max())
+    taken = state.iterate.multiplier[layout.tangential[state.faces[0].slip]]
+    pressing = state.iterate.multiplier[layout.tangential_frictional[state.faces[0].slip]]
+    along = np.einsum("ia,ia->i", taken, state.faces[0].direction[state.faces[0].slip])
+    assert along == pytest.approx(0.3 * pressing, abs=1e-12 * np.abs(pressing).max())
+
+
 def test_a_disc_whose_force_would_turn_back_gets_a_smaller_step() -> None:
     dual = problem()
     operator = CountedOperator(dual.operator)
@@ -303,7 +321,7 @@ def test_forces_that_are_rounding_are_none() -> None:
 
 def test_a_failure_says_what_was_reached_and_what_to_try() -> None:
     dual, _ = torn_problem(Bricks(n=4, cubes=(3, 2), crown=2.0, shear=0.0, tilt=0.5))
-    mu_f = np.full(dual.layout.n_friction, 0.01)
+    mu_f = np.full(dual.layout.n_friction, 0.003)
     slipping = r"all \d+ discs slip, and friction may not suffice for any equilibrium; raise the friction, "
     with pytest.raises(
         ConvergenceError, match=slipping + "lower the load, add a support, or raise max_steps"
