@@ -506,10 +506,11 @@ class DualSystem:
         """Return how the preconditioner moves copies of nodes together. Collective."""
         if self.inverse.is_rounded:  # where memory is short, no further matrices are stored
             return NOT_SEWN
-        coupled = self.inverse.strongest_coupling(self.torn.components)
-        if self.torn.numbering.comm.allreduce(coupled, op=MPI.MAX) < Sewing.coupled:
+        coupling = self.inverse.strongest_coupling(self.torn.components)
+        coupling = self.torn.numbering.comm.allreduce(coupling, op=MPI.MAX)
+        if coupling < Sewing.coupled:
             return NOT_SEWN
-        return Sewing.of(self.torn, self._B_interface, self.inverse.interface_stiffness())
+        return Sewing.of(self.torn, self._B_interface, self.inverse.interface_stiffness(), coupling)
 
     def _scaling(self, coarse: CoarseSpace) -> Scaling | Unscaled:
         """Return factors √(b·b / b·D⁻¹b) of the rows b of B, one where stiffness is uniform. Collective."""

@@ -53,29 +53,33 @@ class Sewing(NotSewn):
 
     Displacements y belong to rows: the last gluing row of a component of a node, which touches all its
     copies, has the one of that component; all others are zero. `moved`: N, (n_interface, n_local_rows);
-    `forces`: K_bb N; `sewn`: positions of the owned rows with a y; `blocks`: factors of Â on these.
+    `forces`: K_bb N; `sewn`: positions of the owned rows with a y; `blocks`: factors of Â on these;
+    `sweeps`: number of sweeps.
     """
 
     #: Coupling of neighbours from which it pays, see `TornInverse.strongest_coupling`: hexahedra three times
     #: as wide as high. Cubes have 0.3 to 0.45: their blocks take 1.95 with it in place of 1.58 s.
     coupled: ClassVar[float] = 0.65
-    #: Sweeps, and what is taken of each. Chain, ball and blocks need the fewest products with two; one of
-    #: full length 24, 32 and 17 in place of 23, 26 and 14, an exact A⁻¹ 24, 24 and 15.
-    sweeps: ClassVar[int] = 2
+    #: What is taken of each sweep. Chain, ball and blocks need the fewest products with two; one of full
+    #: length 24, 32 and 17 in place of 23, 26 and 14, an exact A⁻¹ 24, 24 and 15.
     damping: ClassVar[float] = 0.6
+    #: Coupling from which a third sweep pays: a graded ball of tetrahedra, 0.95, takes 55 products with it,
+    #: 81 without and 50 with an exact A⁻¹; one of hexahedra, 0.83, 41, 47 and 41; the chain, 0.71, 46 and 41.
+    stiff: ClassVar[float] = 0.8
 
     numbering: DualNumbering
     moved: sp.csr_matrix
     forces: sp.csr_matrix
     sewn: np.ndarray
     blocks: Factor | NoFactor
+    sweeps: int
 
     @classmethod
-    def of(cls, torn: TornSystem, B: sp.csr_matrix, stiffness: sp.csr_matrix) -> NotSewn:
+    def of(cls, torn: TornSystem, B: sp.csr_matrix, stiffness: sp.csr_matrix, coupling: float) -> NotSewn:
         """Return that of a torn system. Collective.
 
         `B`: its rows on the interface, shape (n_local_rows, n_interface); `stiffness`: K_bb of this rank's
-        subdomains.
+        subdomains; `coupling`: the strongest of neighbours on all ranks.
         """
         numbering = torn.numbering
         rows = np.flatnonzero(_carriers(torn, B))
@@ -99,7 +103,7 @@ class Sewing(NotSewn):
         blocks = numbering.sum_rows(blocks)[sewn][:, numbering.owned[sewn]].tocsr()
         with together(numbering.comm):
             factor = Factor(blocks) if len(sewn) else NoFactor()
-        return cls(numbering, moved, forces, sewn, factor)
+        return cls(numbering, moved, forces, sewn, factor, 2 + int(coupling >= cls.stiff))
 
     def eased(self, displacement: np.ndarray) -> np.ndarray:
         """Return an interface displacement with the same jumps that strains bodies less. Collective."""

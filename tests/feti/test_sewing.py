@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,17 @@ import scipy.linalg
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact import Body, ContactPair, Coulomb, Scene, Support, Surface, TotalForce, solve_scene
+from fenics_contact import (
+    Body,
+    BodyMesh,
+    ContactPair,
+    Coulomb,
+    Scene,
+    Support,
+    Surface,
+    TotalForce,
+    solve_scene,
+)
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.sewing import NOT_SEWN, Sewing
@@ -93,7 +104,7 @@ def test_sweeps_are_damped_ones_with_blocks_of_faces_edges_and_vertices(system: 
     same = np.array([[one == other for other in sets] for one in sets])
     jacobi = sewing.damping * np.linalg.inv(np.where(same, A, 0.0))
     left = np.eye(len(A)) - jacobi @ A
-    Q = (np.eye(len(A)) + left) @ jacobi
+    Q = sum(np.linalg.matrix_power(left, k) for k in range(sewing.sweeps)) @ jacobi
     expected = np.eye(len(K)) - N @ Q @ N.T @ K
     found = np.column_stack([sewing.eased(column) for column in np.eye(len(K))])
     assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
@@ -150,6 +161,41 @@ def test_sewn_is_what_flat_cells_couple(monkeypatch: pytest.MonkeyPatch) -> None
     assert flat > WORTH_IT
 
 
+def of_tetrahedra(mesh: BodyMesh) -> BodyMesh:
+    """The mesh with hexahedra split around the least of their nodes, and faces from the least of theirs."""
+
+    def halves(faces: np.ndarray) -> list[np.ndarray]:
+        around = (faces.argmin(axis=1)[:, None] + np.arange(4)) % 4
+        faces = np.take_along_axis(faces, around, axis=1)
+        return [faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]]
+
+    outwards = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+    least, cells = mesh.cells.min(axis=1), []
+    for face in outwards:
+        opposite = ~(mesh.cells[:, face] == least[:, None]).any(axis=1)
+        tips = least[opposite]
+        cells += [np.column_stack([half, tips]) for half in halves(mesh.cells[opposite][:, face])]
+    split = np.concatenate(cells)[:, [0, 2, 1, 3]]
+    return BodyMesh(
+        mesh.points, split, {k: np.concatenate(halves(each)) for k, each in mesh.surfaces.items()}
+    )
+
+
+def test_stiffly_coupled_cells_take_a_third_sweep() -> None:
+    scene, _ = ball()
+    mesh = of_tetrahedra(scene.bodies["ball"].mesh)
+    system = dual(
+        (replace(scene, bodies={"ball": Body(mesh, STEEL)}), {"ball": bisection_partition(mesh, 6)})
+    )
+    sewing = sewing_of(system)
+    three = condition(system, sewn=True)
+    system.preconditioner.sew(replace(sewing, sweeps=2))
+    two = condition(system, sewn=True)
+    print(f"\ncondition of a ball of tetrahedra: {two:.1f} with two sweeps, {three:.1f} with three")
+    assert three < 0.7 * two
+    assert [sewing.sweeps, sewing_of(dual(clamped_block("hexahedron"))).sweeps] == [3, 2]
+
+
 def cubes_of(height: float) -> Cut:
     mesh = block((0, 0, 0), (4, 4, 4 * height), (4, 4, 4))
     scene = Scene({"block": Body(mesh, STEEL)}, [Support("block", "x0")])
@@ -199,7 +245,7 @@ def hertz(discretisation: str, cell: str, friction: float) -> Scene:
 
 @pytest.mark.parametrize(
     ("discretisation", "cell", "friction", "most"),
-    [("mortar", "tetrahedron", 0.0, 65), ("mortar", "tetrahedron", 0.3, 75), ("node", "hexahedron", 0.0, 65)],
+    [("mortar", "tetrahedron", 0.0, 65), ("mortar", "tetrahedron", 0.3, 65), ("node", "hexahedron", 0.0, 65)],
 )
 def test_balls_on_blocks_take_few_products(
     discretisation: str, cell: str, friction: float, most: int
@@ -209,4 +255,4 @@ def test_balls_on_blocks_take_few_products(
     assert state.counts["subdomains"] >= 6
     assert state.balance().imbalance < 1e-9
     assert 10 < np.count_nonzero(state.contact.normal_force) < 0.5 * state.contact.points.count
-    assert state.counts["f_products"] < most  # 90, 103 and 91 without either
+    assert state.counts["f_products"] < most  # 90, 103 and 91 without either, 72 with friction not at rest
