@@ -40,7 +40,7 @@ from fenics_contact import (
 )
 from fenics_contact._base.sparse import FACTOR_BYTES, ROWS_PER_RANK, prefers_explicit
 from fenics_contact._scene.dealing import Dealing
-from fenics_contact.feti.reduced_coarse import Elimination
+from fenics_contact.feti.reduced_coarse import Elimination, ReducedGrams
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.qp import DualProblem, DualSolver, FaceNewton, Smalse
@@ -55,10 +55,12 @@ from fenics_contact.study.worker import peak_memory
 #: factor. One of the matrices has contact rows only.
 COARSE, CONTACT, SCALARS, MATRICES = (2.5, 4.5), (2.0, -2.0), (3.0, 5.0), 3.5
 #: Entries of sparse factors of m motions divided by m^(4/3), and seconds to make them for `COUNTED` motions:
-#: L and U of the matrix of a face; L of the motions without contact, with the matrix reduced by them.
-LU, REDUCED, COUNTED = (64.0, 2.3), (22.0, 3.8), 24576
-#: Seconds in which a Newton step factors its reduced matrices, of size 1536.
-DENSE_STEP = 0.24
+#: L and U of the matrix of a face; L of the motions without contact, with the matrix reduced by them, on one
+#: rank, and in all on several.
+LU, REDUCED, SHARED, COUNTED = (64.0, 2.3), (22.0, 3.8), (32.0, 15.0), 24576
+#: Seconds in which a Newton step factors its reduced matrices, of size 1536, on one rank; in which one of
+#: size c is summed and factored in all on several, divided by c² and c³.
+DENSE_STEP, SHARED_DENSE = 0.24, (2.5e-7, 1.8e-11)
 
 
 #: Sides glued, clamped or in contact, of the first, an inner and the last subdomain in each direction.
@@ -198,8 +200,11 @@ class Lattice:
         bytes_ = 8 * (coarse * size + 2 * scalars)
         bytes_ += dense * (8 * steps * ((MATRICES - 1) * filled + pressed) + matrices * size**2 / 8)
         solving = 2 * size**2 if dense else 4 * LU[0] * size ** (4 / 3) / self.holders(ranks)
+        shared = self.reduced and self.holders(ranks) > 1
         if self.reduced:
             solving = 8 * REDUCED[0] * size ** (4 / 3) + 2 * self.pressed**2
+        if shared:  # the small one is refined
+            solving = (8 * SHARED[0] * size ** (4 / 3) + 6 * self.pressed**2) / self.holders(ranks)
         flops = products * self.local / ranks + coarse * solving + 4 * contact * self.contact_rows
         if ranks == 1:
             return PhaseCosts(flops=round(flops))
@@ -208,8 +213,11 @@ class Lattice:
             message_bytes=round(exchanges * 24 * faces * (self.edge + 1) ** 2 + 16 * contact * others),
             reductions=round(coarse + scalars + 2 * matrices * dense),
             reduction_bytes=round(bytes_),
-            copies=round(steps + coarse * (not dense)),
-            copy_bytes=round(8 * steps + 8 * coarse * size * (not dense)),
+            # Those who share factors collect the vector, and sum and copy one of the motions with contact.
+            copies=round(steps + coarse * ((not dense) + 5 * shared)),
+            copy_bytes=round(
+                8 * steps + 8 * coarse * (size * (not dense) + (size + 4 * self.pressed) * shared)
+            ),
             transfers=round(steps + matrices * (not dense)),
             transfer_bytes=round(20 * steps * others),
             meetings=3 + 2 * steps,
@@ -230,16 +238,21 @@ class Lattice:
 
     def holders(self, ranks: int) -> int:
         """Return the ranks that hold the factors of the coarse problem."""
-        if self.motions <= DENSE_LIMIT or self.reduced:
+        if self.reduced:
+            return ReducedGrams.holders(ranks, self.motions)
+        if self.motions <= DENSE_LIMIT:
             return 1
         return min(ranks, -(-self.motions // ROWS_PER_RANK))
 
     def coarse_factors(self, ranks: int) -> float:
         """Return the seconds of all coarse factorisations: sparse ones grow with m², dense ones with c³."""
-        growth = (self.motions / COUNTED) ** 2
-        if self.reduced:
+        growth, holders = (self.motions / COUNTED) ** 2, self.holders(ranks)
+        if not self.reduced:
+            return MATRICES * self.steps * LU[1] * growth / holders
+        if holders == 1:
             return REDUCED[1] * growth + self.steps * DENSE_STEP * (self.pressed / 1536) ** 3
-        return MATRICES * self.steps * LU[1] * growth / self.holders(ranks)
+        each = SHARED_DENSE[0] * self.pressed**2 + SHARED_DENSE[1] * self.pressed**3
+        return (SHARED[1] * growth + MATRICES * self.steps * each) / holders
 
     def held(self) -> float:
         """Return the bytes that every machine holds of the whole problem, see `docs/scaling.md`."""

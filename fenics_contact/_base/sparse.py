@@ -13,7 +13,8 @@ import weakref
 import zlib
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -248,11 +249,14 @@ _subsets: dict[tuple[int, int], MPI.Comm] = {}
 
 
 class SharedFactor:
-    """LU factors of Σ A_rank by MUMPS on the first ranks of a communicator.
+    """LU factors of Σ A_rank by MUMPS on some ranks of a communicator, spread over its machines.
 
-    `holders`: number of ranks that hold the factors; `flops`: floating point operations of one solution on
-    this rank, refined once.
+    `holders`: number of ranks that hold the factors; `own`: rows of A on this one; `entries`: of the factors
+    on it; `flops`: floating point operations of one solution on it, refined once.
     """
+
+    kind: ClassVar[str] = "lu"
+    package: ClassVar[str] = "mumps"
 
     def __init__(
         self, comm: MPI.Comm, share: sp.csr_matrix, scale: Vector, *, holders: int | None = None
@@ -266,11 +270,14 @@ class SharedFactor:
         self._comm, self.size, self._scale = comm, share.shape[0], scale
         wanted = -(-self.size // ROWS_PER_RANK) if holders is None else holders
         self.holders = max(1, min(comm.size, wanted))
-        self._bounds = np.linspace(0, self.size, self.holders + 1).astype(np.int64)
-        rows = self._own_rows(share)
-        self._holds = comm.rank < self.holders
-        self._subset = _first_ranks(comm, self.holders)
-        self.flops = 0
+        # Blocks of equal size, the last smaller, as ScaLAPACK has them.
+        self._bounds = np.minimum(np.arange(self.holders + 1) * -(-self.size // self.holders), self.size)
+        self._ranks, self._subset = spread(comm, self.holders)
+        self._holds, self.own = comm.rank in self._ranks, slice(0)
+        if self._holds:
+            self.own = slice(*self._bounds[self._subset.rank : self._subset.rank + 2].tolist())
+        rows = self.own_rows(share)
+        self.flops = self.entries = 0
         if self._holds:
             self._factor(rows)
 
@@ -279,37 +286,57 @@ class SharedFactor:
 
         `refine`: correct for the shift.
         """
-        check_not_forked()
         solution = np.empty(self.size)
         if self._holds:
-            start, stop = self._bounds[self._comm.rank : self._comm.rank + 2]
-            own = self._scale[start:stop]
-            self._right.array_w[:] = own * right[start:stop]
-            self._ksp.solve(self._right, self._left)
-            if refine:
-                self._matrix.mult(self._left, self._residual)
-                self._residual.aypx(-1.0, self._right)
-                self._ksp.solve(self._residual, self._correction)
-                self._left.axpy(1.0, self._correction)
-            local = own * self._left.array_r
-            counts = np.diff(self._bounds)
-            self._subset.Gatherv(local, (solution, counts, self._bounds[:-1], MPI.DOUBLE))
+            solution = self.gathered(self.solve_own(right[self.own], refine=refine))
         if self._comm.size > 1:
             self._comm.Bcast(solution)
         return solution
 
-    def _own_rows(self, share: sp.csr_matrix) -> sp.csr_matrix:
-        """Return the scaled rows that this rank is to hold, summed over all ranks."""
+    def solve_own(self, right: Vector, *, refine: bool = True) -> Vector:
+        """Return rows `own` of A⁻¹ times a vector with such rows. Collective on the holders."""
+        check_not_forked()
+        scale = self._scale[self.own]
+        self._right.array_w[:] = scale * right
+        self._ksp.solve(self._right, self._left)
+        if refine:
+            self._matrix.mult(self._left, self._residual)
+            self._residual.aypx(-1.0, self._right)
+            self._ksp.solve(self._residual, self._correction)
+            self._left.axpy(1.0, self._correction)
+        return np.asarray(scale * self._left.array_r)
+
+    def gathered(self, own: Vector) -> Vector:
+        """Return a vector of which holders have rows `own`; zero but on the first. Collective on these."""
+        whole, counts = np.zeros(self.size), np.diff(self._bounds)
+        self._subset.Gatherv(own, (whole, counts, self._bounds[:-1], MPI.DOUBLE))
+        return whole
+
+    @cached_property
+    def condition(self) -> float:
+        """About the reciprocal condition of the scaled matrix, or more, by inverse iteration. Collective."""
+        largest = 0.0
+        for probe in np.random.default_rng(0).standard_normal((4, self.size)):
+            x = probe / np.linalg.norm(probe)
+            for _ in range(2):
+                x = self.solve(x / self._scale, refine=False) / self._scale
+                growth = float(np.linalg.norm(x))
+                x /= growth
+            largest = max(largest, growth)
+        return 1.0 / largest
+
+    def own_rows(self, share: sp.csr_matrix) -> sp.csr_matrix:
+        """Return rows `own` of a sum of shares with as many rows as A, scaled. Collective."""
         entries = share.tocoo()
-        holder = np.searchsorted(self._bounds, entries.row, side="right") - 1
+        holder = self._ranks[np.searchsorted(self._bounds, entries.row, side="right") - 1]
         values = entries.data * self._scale[entries.row] * self._scale[entries.col]
         row, column, value = sent(self._comm, holder, entries.row, entries.col, values)
-        first = self._bounds[min(self._comm.rank, self.holders - 1)]
-        height = self._bounds[self._comm.rank + 1] - first if self._comm.rank < self.holders else 0
-        return Csr((value, (row - first, column)), shape=(height, self.size))
+        first = self.own.start or 0
+        return Csr((value, (row - first, column)), shape=(self.own.stop - first, share.shape[1]))
 
     def _factor(self, rows: sp.csr_matrix) -> None:
-        start, height = self._bounds[self._comm.rank], rows.shape[0]
+        sweep(self._subset)  # factors of earlier faces are large
+        start, height = self.own.start, rows.shape[0]
         # Every diagonal entry must exist for the shift, also zeros, which sums of sparse matrices drop.
         entries, own = rows.tocoo(), np.arange(height)
         value = np.concatenate([entries.data, np.zeros(height)])
@@ -318,33 +345,47 @@ class SharedFactor:
         csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data)
         shape = ((height, self.size), (height, self.size))
         self._matrix = PETSc.Mat().createAIJ(shape, csr=csr, comm=self._subset)
-        shifted = self._matrix.copy()
-        shifted.shift(SHIFT)
+        given = self._given(self._matrix)
         self._ksp = PETSc.KSP().create(self._subset)
-        self._ksp.setOperators(shifted)
+        self._ksp.setOperators(given)
         self._ksp.setType(PETSc.KSP.Type.PREONLY)
         pc = self._ksp.getPC()
-        pc.setType(PETSc.PC.Type.LU)
-        pc.setFactorSolverType("mumps")
+        pc.setType(self.kind)
+        pc.setFactorSolverType(self.package)
         self._ksp.setUp()
         self._right, self._left = self._matrix.createVecs()
         self._residual, self._correction = self._matrix.createVecs()
-        entries = pc.getFactorMatrix().getInfo(PETSc.Mat.InfoType.LOCAL)["nz_used"]
-        self.flops = 4 * int(entries) + 2 * rows.nnz  # L and U, twice
+        self.entries = self._entries_of(pc.getFactorMatrix())
+        self.flops = 4 * self.entries + 2 * rows.nnz  # L and U, twice
         vectors = (self._right, self._left, self._residual, self._correction)
-        dispose_with(self, pc, self._ksp, shifted, self._matrix, *vectors, comm=self._subset)
+        dispose_with(self, pc, self._ksp, given, self._matrix, *vectors, comm=self._subset)
+
+    def _given(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Return what is factored, also where the matrix is singular."""
+        shifted = matrix.copy()
+        shifted.shift(SHIFT)
+        return shifted
+
+    def _entries_of(self, factor: PETSc.Mat) -> int:
+        """Return the number of entries on this rank, which MUMPS counts in millions if it is large."""
+        count = int(factor.getMumpsInfo(27))
+        return count if count >= 0 else -1_000_000 * count
 
 
-def _first_ranks(comm: MPI.Comm, count: int) -> MPI.Comm:
-    """Return a communicator of the first ranks, made once for each communicator and count. Collective."""
+def spread(comm: MPI.Comm, count: int) -> tuple[np.ndarray, MPI.Comm]:
+    """Return ranks at equal distances, the first included, and their communicator. Collective.
+
+    It is made once for each communicator and count, and is not to be used by other ranks.
+    """
+    ranks = np.arange(count) * comm.size // count
     if count == 1:
-        return MPI.COMM_SELF
+        return ranks, MPI.COMM_SELF
     if count == comm.size:
-        return comm
+        return ranks, comm
     key = (comm.py2f(), count)
     if key not in _subsets:
-        _subsets[key] = comm.Split(0 if comm.rank < count else MPI.UNDEFINED)
-    return _subsets[key]
+        _subsets[key] = comm.Split(0 if comm.rank in ranks else MPI.UNDEFINED)
+    return ranks, _subsets[key]
 
 
 def rounded(values: Any, scale: float) -> np.ndarray:

@@ -260,7 +260,7 @@ def agree(
 
 
 @contextmanager
-def together(comm: MPI.Comm, where: str = "") -> Iterator[None]:
+def together(comm: MPI.Comm, where: str = "", *, wait: float | None = None) -> Iterator[None]:
     """Run a block that makes no collective calls, then raise on all ranks if it failed on one.
 
     Collective on ``comm``, which the block itself must not use.
@@ -268,6 +268,7 @@ def together(comm: MPI.Comm, where: str = "") -> Iterator[None]:
     Args:
         comm: Communicator whose ranks must stay together.
         where: As for `agree`.
+        wait: As for `agree`; some ranks may call each other in the block if it is given.
 
     Raises:
         BaseException: The error of the block on this rank, or as in `agree` that on another.
@@ -284,7 +285,7 @@ def together(comm: MPI.Comm, where: str = "") -> Iterator[None]:
         raise
     except BaseException as caught:
         error = naming_memory(caught)
-    agree(comm, error, where)
+    agree(comm, error, where, wait=wait)
 
 
 def on_root_then_bcast(comm: MPI.Comm | None, make: Callable[[], Found]) -> Found:

@@ -130,12 +130,14 @@ class SparseGramInverse:
     that is singular to rounding.
     """
 
-    def __init__(self, comm: MPI.Comm, share: sp.csr_matrix) -> None:
+    def __init__(
+        self, comm: MPI.Comm, share: sp.csr_matrix, factor_of: type[SharedFactor] = SharedFactor
+    ) -> None:
         """Factor the sum of the ranks' shares, each of shape (m, m). Collective on ``comm``."""
         diagonal = global_sum(comm, share.diagonal())
         floor = RANK_TOLERANCE**2 * max(diagonal.max(initial=0.0), np.finfo(float).tiny)
         scale = 1.0 / np.sqrt(np.where(diagonal > floor, diagonal, 1.0))
-        self._factor = SharedFactor(comm, share, scale)
+        self._factor = factor_of(comm, share, scale)
         self._scale = scale
         self._null = _null_vectors(len(diagonal), self._invert_scaled)
         self.rank = len(diagonal) - self._null.shape[1]
@@ -264,7 +266,7 @@ class CoarseSpace:
             return self.faces.inverse(self.matrix[:, contact])
         gram = gram_matrix(self.comm, self.matrix) if self._gram is None else self._gram
         self._gram = None  # of no use beside its factors
-        return GramInverse(gram) if isinstance(gram, np.ndarray) else SparseGramInverse(self.comm, gram)
+        return factored_gram(self.comm, gram)
 
     @property
     def faces(self) -> FaceGrams | None:
@@ -390,6 +392,13 @@ def summed_if_small(comm: MPI.Comm, share: sp.csr_matrix) -> Gram:
     return matrix
 
 
+def factored_gram(
+    comm: MPI.Comm, gram: Gram, factor_of: type[SharedFactor] = SharedFactor
+) -> GramInverse | SparseGramInverse:
+    """Factor a dense matrix, or the sum of shares. Collective."""
+    return GramInverse(gram) if isinstance(gram, np.ndarray) else SparseGramInverse(comm, gram, factor_of)
+
+
 def plus(gram: Gram, sparse: sp.csr_matrix) -> Gram:
     """Return the sum of both, in place where the first is dense."""
     if not isinstance(gram, np.ndarray):
@@ -451,12 +460,17 @@ def invert_square(
 
     It counts as singular if its reciprocal condition number is below ``singular``.
     """
-    matrix = summed_if_small(comm, share)
+    factor = factored_square(comm, summed_if_small(comm, share), scale)
+    return factor if factor.condition > singular else None
+
+
+def factored_square(
+    comm: MPI.Comm, matrix: Gram, scale: Vector, factor_of: type[SharedFactor] = SharedFactor
+) -> DenseSquareInverse | SharedFactor:
+    """Factor a dense matrix, or the sum of shares, scaled to order one. Collective."""
     if isinstance(matrix, np.ndarray):
-        dense = DenseSquareInverse(matrix, scale)
-        return dense if dense.condition > singular else None
-    factor = SharedFactor(comm, share, scale)
-    return factor if _largest_growth(factor, scale) < 1.0 / singular else None
+        return DenseSquareInverse(matrix, scale)
+    return factor_of(comm, matrix, scale)
 
 
 class DenseSquareInverse:
@@ -484,16 +498,3 @@ class DenseSquareInverse:
             return right_side
         solved = scipy.linalg.lu_solve(self._factor, self._scale * right_side, check_finite=False)
         return np.asarray(self._scale * solved)
-
-
-def _largest_growth(factor: SharedFactor, scale: Vector, probes: int = 4) -> float:
-    """Return a lower estimate of the scaled inverse's norm by inverse iteration. Collective."""
-    largest = 0.0
-    for start in np.random.default_rng(0).standard_normal((probes, factor.size)):
-        x = start / np.linalg.norm(start)
-        for _ in range(2):
-            x = factor.solve(x / scale, refine=False) / scale
-            growth = float(np.linalg.norm(x))
-            x /= growth
-        largest = max(largest, growth)
-    return largest

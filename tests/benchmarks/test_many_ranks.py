@@ -58,13 +58,13 @@ def test_lattices_have_the_sizes_of_their_subdomains() -> None:
     assert many.flops > alone.flops / 64
     assert many.largest_reduction == 8 * 25 * 10**3
     assert more.solve(64).largest_copy == 8 * 6 * 512
-    assert Lattice(40).holders(1000) == 20
-    assert Lattice(40).coarse_factors(1000) == pytest.approx(
-        3.5 * 8 * 2.3 * (384000 / 24576) ** 2 / 20, rel=1e-12
-    )
     # Once the motions without contact, and in each of 8 steps those with contact, alone.
-    assert (Lattice(16).reduced, Lattice(40).reduced, one.reduced) == (True, False, False)
+    assert (Lattice(16).reduced, Lattice(40).reduced, one.reduced) == (True, True, False)
+    assert (Lattice(16).holders(1000), Lattice(40).holders(1000)) == (1, 20)
     assert Lattice(16).coarse_factors(1000) == pytest.approx(3.8 + 8 * 0.24)
+    assert Lattice(40).coarse_factors(1000) == pytest.approx(
+        (15.0 * (384000 / 24576) ** 2 + 3.5 * 8 * (2.5e-7 * 9600**2 + 1.8e-11 * 9600**3)) / 20, rel=1e-12
+    )
 
 
 def test_the_table_says_what_outgrows_the_subdomains(capsys: pytest.CaptureFixture[str]) -> None:
@@ -77,7 +77,7 @@ def test_the_table_says_what_outgrows_the_subdomains(capsys: pytest.CaptureFixtu
     assert rows[-1][1] > 6e8
     assert rows[0][4] + rows[0][5] < rows[0][3], "on one rank the subdomains take the time"
     assert rows[-1][4] > 5 * rows[-1][3]
-    assert rows[-1][5] > 1000 * rows[-1][3]
+    assert 5000 > rows[-1][5] > 1000 * rows[-1][3]
     assert rows[2][5] < 0.1 * 3.5 * 8 * 2.3 * (rows[2][2] / 24576) ** 2, "faces factor contact alone"
     assert rows[-1][3] == pytest.approx(rows[2][3], rel=0.15)
 

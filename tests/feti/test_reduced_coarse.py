@@ -92,7 +92,6 @@ def test_it_is_not_built_where_contact_acts_on_many_motions(columns: sp.csr_matr
     everywhere = sp.csr_matrix(np.ones((M, 1)))
     assert Elimination(np.arange(GLUED))(MPI.COMM_SELF, sp.hstack([columns, everywhere]).tocsr()) is None
     assert Elimination(np.arange(GLUED), largest=0.4)(MPI.COMM_SELF, columns) is None
-    assert Elimination(np.arange(GLUED), most=M - 1)(MPI.COMM_SELF, columns) is None
 
 
 @pytest.mark.parametrize("lost", [0.0, 1e-9], ids=["zero", "rounding"])
