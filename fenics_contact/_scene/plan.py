@@ -17,7 +17,7 @@ from fenics_contact._scene.effects import Effect, EffectName, listed
 from fenics_contact._scene.memory import Subdomains, expected_memory
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.supports import RigidSurface
-from fenics_contact._scene.tools import with_tool_parts
+from fenics_contact._scene.tools import check_partitions, with_tool_parts
 from fenics_contact._surfaces.facets import has_midside_pressure
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import pieces
@@ -191,6 +191,7 @@ def make_plan(
     from fenics_contact._scene.pair_geometry import pair_geometry, unpaired_bodies
 
     partitions = with_tool_parts(scene.bodies, partitions)
+    check_partitions(scene.bodies, partitions)
     effects = effects_of(scene)
     partitions = {name: pieces(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
     names = {effect.name for effect in effects}

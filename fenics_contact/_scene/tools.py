@@ -198,8 +198,22 @@ def with_tool_parts(
     bodies: Mapping[str, Body], partitions: Mapping[str, np.ndarray]
 ) -> Mapping[str, np.ndarray]:
     """Return partitions of bodies with those of the cells of tools, which no one cuts."""
-    tools = [name for name in tools_in(bodies) if name not in partitions]
+    known = isinstance(partitions, Mapping)  # others are rejected where all ranks have them
+    tools = [name for name in tools_in(bodies) if known and name not in partitions]
     return {**partitions, **{name: np.zeros(1, dtype=np.int64) for name in tools}} if tools else partitions
+
+
+def check_partitions(bodies: Mapping[str, Body], partitions: Mapping[str, np.ndarray]) -> None:
+    """Reject partitions of other bodies, or of other numbers of cells."""
+    if not isinstance(partitions, Mapping):
+        raise InvalidInputError(f"partitions must be by names of bodies, got {partitions!r}: leave it out")
+    for name, body in bodies.items():
+        if name not in partitions:
+            raise InvalidInputError(f"every body needs a partition, {name!r} has none: pass its cells")
+        partition, cells = partitions[name], body.mesh.n_cells
+        if not isinstance(partition, np.ndarray) or partition.shape != (cells,):
+            given = partition.shape if isinstance(partition, np.ndarray) else repr(partition)
+            raise InvalidInputError(f"partitions[{name!r}] needs shape ({cells},), got {given}")
 
 
 def _material(slave: Body, much: bool) -> Material:

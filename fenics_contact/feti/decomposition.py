@@ -22,7 +22,7 @@ from fenics_contact._scene.local_axes import NO_AXES, LocalAxes, joined_axes, sa
 from fenics_contact._scene.memory import Subdomains, require_memory
 from fenics_contact._scene.revolution import hold_axis
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.tools import with_tool_parts
+from fenics_contact._scene.tools import check_partitions, with_tool_parts
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.following import dependent_nodes
 from fenics_contact.feti.same_input import check_same_input
@@ -464,8 +464,7 @@ def decompose(
     """
     start(comm)
     comm = with_ledger(comm)
-    if isinstance(partitions, Mapping):
-        partitions = with_tool_parts(scene.bodies, partitions)
+    partitions = with_tool_parts(scene.bodies, partitions)
     check_same_input(comm, scene, partitions=partitions)
     touching = {surface.body for pair in (*scene.contacts, *scene.ties) for surface in pair.surfaces}
     whole = {name: body.mesh for name, body in scene.bodies.items()}
@@ -529,16 +528,9 @@ def _whole(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
 
 
 def _checked_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    if not isinstance(partitions, Mapping):
-        raise InvalidInputError(f"partitions must be by names of bodies, got {partitions!r}: leave it out")
+    check_partitions(scene.bodies, partitions)
     for name, body in scene.bodies.items():
-        if name not in partitions:
-            raise InvalidInputError(f"every body needs a partition, {name!r} has none: pass its cells")
-        partition = partitions[name]
-        if not isinstance(partition, np.ndarray) or partition.shape != (body.mesh.n_cells,):
-            given = partition.shape if isinstance(partition, np.ndarray) else repr(partition)
-            raise InvalidInputError(f"partitions[{name!r}] needs shape ({body.mesh.n_cells},), got {given}")
-        check_face_connected(body.mesh, pieces(body.mesh, partition))
+        check_face_connected(body.mesh, pieces(body.mesh, partitions[name]))
     return {name: _whole(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
 
 

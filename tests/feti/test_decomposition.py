@@ -40,6 +40,8 @@ def test_a_number_of_subdomains_is_no_partition(partitions: Any, message: str) -
     scene, _ = lone_block("hexahedron")
     with pytest.raises(InvalidInputError, match=message):
         solve_scene(scene, MPI.COMM_SELF, partitions=partitions)
+    with pytest.raises(InvalidInputError, match=message):
+        scene.plan(partitions)
 
 
 def test_a_partition_of_another_mesh_is_refused() -> None:
