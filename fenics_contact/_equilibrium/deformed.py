@@ -15,7 +15,7 @@ from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.other_rows import prescribed_as_is
 from fenics_contact._equilibrium.outer_loops import outer_loops
 from fenics_contact._equilibrium.previous import ONLY_STEP, AfterTransfer, Previous, Wanted
-from fenics_contact._equilibrium.starts import CoarseStart, carried_over
+from fenics_contact._equilibrium.starts import CoarseStart
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
     require_resisted,
@@ -42,6 +42,7 @@ from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import nodal_mean_transposed, nodal_sum
+from fenics_contact.feti.carried import carried_over
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.torn import TornSystem, contacts_alike
 from fenics_contact.materials.plastic import has_history

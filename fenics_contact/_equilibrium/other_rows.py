@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact._equilibrium.starts import carried_over
 from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.local_axes import same_axes
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.feti.carried import carried_over
 from fenics_contact.feti.decomposition import Decomposition, prescribed_along
 from fenics_contact.feti.joints import JOINTS
 from fenics_contact.feti.torn import TornSystem, build_torn_system, contacts_alike, with_points_inside

@@ -57,6 +57,17 @@ class Resumable(Function, Protocol):
         """Continue from what `memory` returned, possibly in another process. Collective."""
 
 
+@runtime_checkable
+class Started(Function, Protocol):
+    """A constraint's function that starts from what it had before; the states are those of the objective."""
+
+    def starts(self) -> Mapping[str, NDArray[Any]]:
+        """Return what its next value starts from. Collective."""
+
+    def start_from(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Start from what `starts` returned, after the objective has recalled its memory. Collective."""
+
+
 class _Forgetful:
     """The memory of a function whose values depend on no earlier ones."""
 
@@ -160,6 +171,10 @@ class StoredProgress(Progress):
         if checkpoint.comm is not None:
             self.comm = checkpoint.comm
         self._fingerprint = {**_fingerprint(method, problem), **self._fun.fingerprint()}
+        self._limits: dict[str, Started] = {}
+        for number, limit in enumerate(problem.nonlinear):
+            if isinstance(limit.fun, Started):
+                self._limits[f"limit {number}."] = limit.fun
 
     def recalled(self) -> MethodState | None:
         """Return the stored state, None where the run starts anew. Collective."""
@@ -168,6 +183,9 @@ class StoredProgress(Progress):
             return None
         names = [name for name in stored if name.startswith(_OF_FUN)]
         self._fun.recall({name.removeprefix(_OF_FUN): stored.pop(name) for name in names})
+        for head, fun in self._limits.items():
+            names = [name for name in stored if name.startswith(head)]
+            fun.start_from({name.removeprefix(head): stored.pop(name) for name in names})
         state = MethodState.from_arrays(stored)
         self._written = state.evaluations
         self._tell(state)
@@ -186,6 +204,8 @@ class StoredProgress(Progress):
             return
         arrays, memory = state.arrays(), self._fun.memory()
         arrays.update({f"{_OF_FUN}{name}": value for name, value in memory.items()})
+        for head, fun in self._limits.items():
+            arrays.update({f"{head}{name}": value for name, value in fun.starts().items()})
         self._checkpoint.write(KIND, self._fingerprint, arrays, self.comm)
         self._written = state.evaluations
 

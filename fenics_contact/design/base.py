@@ -14,11 +14,11 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.fingerprint import described
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.scene import Scene
-from fenics_contact.design.adjoint_starts import NoAdjointStart
 from fenics_contact.design.design import SurfaceDesign
 from fenics_contact.design.memory import DesignPoint, DesignRecord, JointPoint
 from fenics_contact.design.objective import Objective
 from fenics_contact.errors import InvalidDesignError, collectively
+from fenics_contact.results.adjoint_starts import NoAdjointStart
 from fenics_contact.results.deformed_state import AnyState
 
 Point = TypeVar("Point", DesignPoint, JointPoint)
@@ -182,6 +182,13 @@ class SingleProblem(DesignProblem[DesignPoint]):
     def differentiate(self, state: AnyState) -> DesignPoint:
         """Return value and subgradient at a known state, for one adjoint. Collective."""
 
+    def starts(self) -> dict[str, np.ndarray]:
+        """Return what the next adjoint starts from, for a checkpoint. Collective."""
+        return {}
+
+    def start_from(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Start the next adjoint from what `starts` returned. Collective."""
+
     def function(self, objective: Objective, name: str | None = None) -> DesignFunction:
         """Return another objective as a function α -> (value, subgradient), for a constraint.
 
@@ -228,6 +235,14 @@ class DesignFunction:
     def fingerprint(self) -> dict[str, str]:
         """Identify the function, for a checkpoint."""
         return described(self.objective, f"function {self.name}")
+
+    def starts(self) -> dict[str, np.ndarray]:
+        """Return what its next adjoint starts from, for a checkpoint. Collective."""
+        return self._own.starts()
+
+    def start_from(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Start from what `starts` returned; the problem has recalled its memory before. Collective."""
+        self._own.start_from(arrays)
 
     def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return c(α) and a subgradient, as accurately as the problem can. Collective."""

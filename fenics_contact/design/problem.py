@@ -17,13 +17,7 @@ from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.adjoint import WeakChoice, linearise_face, require_from_rest
-from fenics_contact.design.adjoint_starts import (
-    STORED,
-    AdjointStart,
-    NoAdjointStart,
-    adjoint_tolerance,
-    restored,
-)
+from fenics_contact.design.adjoint_starts import adjoint_tolerance
 from fenics_contact.design.base import SingleProblem, comm_of, with_fewest_weak_points, with_objective
 from fenics_contact.design.design import SurfaceDesign
 from fenics_contact.design.memory import AdaptiveTolerance, DesignMemory, DesignPoint, Stored, tightest_of
@@ -48,6 +42,7 @@ from fenics_contact.errors.kinds import safe_log
 from fenics_contact.materials.hyperelastic import has_mean_dilatation
 from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.refinement import Refinement
+from fenics_contact.results.adjoint_starts import STORED, NoAdjointStart, restored
 from fenics_contact.results.deformed_state import AnyState
 
 logger = logging.getLogger(__name__)
@@ -283,12 +278,22 @@ class ShapeProblem(SingleProblem):
             raise InvalidInputError(
                 "checkpoints of designs need linear materials, got others: leave the checkpoint out"
             )
-        return self._memory.stored() | self._adjoint_start.at(self._memory.state).stored()
+        return self._memory.stored() | self.starts()
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
         """Continue from what `memory` returned, also on another number of ranks. Collective."""
         self._memory.recall({name: memory[name] for name in memory if name != STORED})
-        self._adjoint_start = restored(memory, self._memory.state)
+        self.start_from(memory)
+
+    def starts(self) -> dict[str, np.ndarray]:
+        """Return what the next adjoint starts from, for a checkpoint. Collective."""
+        state = self._memory.state
+        return {} if state is None else self._adjoint_start.at(state.torn).stored()
+
+    def start_from(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Start the next adjoint from what `starts` returned. Collective."""
+        if (state := self._memory.state) is not None:
+            self._adjoint_start = restored(arrays, state.torn)
 
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
         """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
@@ -453,7 +458,7 @@ class ShapeProblem(SingleProblem):
         """Keep what the next state and the next adjoint start from. Collective."""
         self._memory.record_state(alpha, state)
         self._memory.products += state.products
-        self._adjoint_start = self._adjoint_start.at(state)
+        self._adjoint_start = self._adjoint_start.at(state.torn)
 
     def _point_at(
         self,
@@ -471,11 +476,11 @@ class ShapeProblem(SingleProblem):
             linearised = linearise_face(state, self.choice)
             start, accuracy = self._adjoint_start, adjoint_tolerance(tolerance, linearised.weak)
             if known is not None:
-                start = AdjointStart.of(known.state, known.adjoint_multiplier)
+                start = known.state.adjoint_start(known.adjoint_multiplier)
             adjoint, error, partials = adjoint_of(
-                state, partials, linearised, accuracy, start.at(state).direction()
+                state, partials, linearised, accuracy, start.at(state.torn).direction()
             )
-            self._adjoint_start = AdjointStart.of(state, adjoint.multiplier)
+            self._adjoint_start = state.adjoint_start(adjoint.multiplier)
         with one_thread(self.comm), self._timer.phase("gradient"):
             by_points = by_nodes(state, adjoint, partials, linearised, self.geometry.forms)
             gradient = self.geometry.pull_back(by_points)

@@ -19,6 +19,7 @@ from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.face_newton import FaceNewton
 from fenics_contact.qp.solution import DualSolution
+from fenics_contact.results.adjoint_starts import AdjointStart
 from fenics_contact.results.contact import RowValues
 from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
 from fenics_contact.results.rigid_motions import UnheldMotion, idle_motions, unheld_motions
@@ -71,6 +72,10 @@ class LinearState(State):
     def reusable(self) -> DualSystem | None:
         """The dual system."""
         return self.system
+
+    def adjoint_start(self, multiplier: np.ndarray) -> AdjointStart:
+        """Return what adjoints of states nearby start from, given one of this state, owned. Collective."""
+        return AdjointStart.of(self.torn, self.solution.multiplier, multiplier)
 
     @property
     def products(self) -> int:

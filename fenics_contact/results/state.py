@@ -23,6 +23,7 @@ from fenics_contact.feti.averages import nodal_mean
 from fenics_contact.feti.direct import DirectSolution
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.solution import Solution
+from fenics_contact.results.adjoint_starts import NoAdjointStart
 from fenics_contact.results.by_name import ByName
 from fenics_contact.results.constraints import ConstraintForces
 from fenics_contact.results.contact import ContactResult, RowValues, Status
@@ -628,6 +629,10 @@ class State(ABC):
     def reusable(self) -> DualSystem | None:
         """The dual system, whose unchanged parts the next one reuses; None where there is none."""
         return None
+
+    def adjoint_start(self, multiplier: np.ndarray) -> NoAdjointStart:
+        """Return what adjoints of states nearby start from, given one of this state, owned. Collective."""
+        return NoAdjointStart()
 
     @property
     def products(self) -> int:

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import ContactProblem, Coulomb, ShapeProblem, box_partition
-from fenics_contact.design import DesignPoint, FrictionWork, Objective, PressureNorm, TotalPotential
+from fenics_contact import Checkpoint, ContactProblem, Coulomb, ShapeProblem, box_partition, minimize
+from fenics_contact.design import (
+    BundleTrust,
+    DesignPoint,
+    FrictionWork,
+    NonlinearConstraint,
+    Objective,
+    PressureNorm,
+    TotalPotential,
+)
 from fenics_contact.design.adjoint import WeakChoice, WeakPoints, linearise_face, solve_adjoint
-from fenics_contact.design.adjoint_starts import AdjointStart, NoAdjointStart, adjoint_tolerance, restored
+from fenics_contact.design.adjoint_starts import adjoint_tolerance
+from fenics_contact.design.base import DesignFunction
 from fenics_contact.design.sensitivity import by_nodes
+from fenics_contact.results.adjoint_starts import AdjointStart, NoAdjointStart, restored
 from fenics_contact.results.linear_state import as_linear
 from tests.design.chains import BOXES, chain, chain_designs
 
@@ -93,11 +105,37 @@ def test_a_start_has_no_part_along_the_multiplier_of_its_state_and_is_stored_who
     size = np.linalg.norm(start.rest) * np.linalg.norm(multiplier)
     assert abs(start.rest @ multiplier) < 1e-12 * size
     assert 0.0 < np.linalg.norm(start.rest) < 0.2 * np.linalg.norm(point.adjoint_multiplier)
-    again = restored(start.stored(), point.state)
+    again = restored(start.stored(), point.state.torn)
     assert isinstance(again, AdjointStart)
     assert again.rest.tolist() == start.rest.tolist()
-    assert isinstance(restored({}, point.state), NoAdjointStart)
-    assert isinstance(restored(start.stored(), None), NoAdjointStart)
+    assert not isinstance(restored({}, point.state.torn), AdjointStart)
+
+
+def minimised(checkpoint: Checkpoint | None, evaluations: int) -> DesignFunction:
+    """Minimise the energy with a bound of the pressure, and return the pressure as it was differentiated."""
+    problem = posed(TotalPotential())
+    limit = problem.function(PressureNorm())
+    minimize(
+        problem,
+        walk(problem.size, 0, 0.0)[0],
+        BundleTrust(max_evaluations=evaluations, raise_on_failure=False),
+        bounds=(-0.1, 0.1),
+        constraints=NonlinearConstraint(limit, 1e9),
+        checkpoint=checkpoint,
+    )
+    return limit
+
+
+def test_adjoints_of_constraints_go_on_from_a_checkpoint(tmp_path: Path) -> None:
+    """Their gradients are the same to the last bit, as those of the objective are."""
+    path = tmp_path / "run.npz"
+    minimised(Checkpoint(path), 2)
+    whole, gone_on = (minimised(each, 3)._last for each in (None, Checkpoint(path, resume=True)))
+    assert whole is not None
+    assert gone_on is not None
+    assert gone_on.alpha.tolist() == whole.alpha.tolist()
+    assert gone_on.adjoint_iterations == whole.adjoint_iterations
+    assert gone_on.gradient.tolist() == whole.gradient.tolist()
 
 
 @pytest.mark.parametrize(
