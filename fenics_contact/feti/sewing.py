@@ -53,8 +53,8 @@ class Sewing(NotSewn):
 
     Displacements y belong to rows: the last gluing row of a component of a node, which touches all its
     copies, has the one of that component; all others are zero. `moved`: N, (n_interface, n_local_rows);
-    `forces`: K_bb N; `sewn`: positions of the owned rows with a y; `blocks`: factors of Â on these;
-    `sweeps`: number of sweeps.
+    `forces`: K_bb N; `share`: this rank's part of A; `sewn`: positions of the owned rows with a y; `blocks`:
+    factors of Â on these; `sweeps`: number of sweeps.
     """
 
     #: Coupling of neighbours from which it pays, see `TornInverse.strongest_coupling`: hexahedra three times
@@ -70,6 +70,7 @@ class Sewing(NotSewn):
     numbering: DualNumbering
     moved: sp.csr_matrix
     forces: sp.csr_matrix
+    share: sp.csr_matrix
     sewn: np.ndarray
     blocks: Factor | NoFactor
     sweeps: int
@@ -103,7 +104,8 @@ class Sewing(NotSewn):
         blocks = numbering.sum_rows(blocks)[sewn][:, numbering.owned[sewn]].tocsr()
         with together(numbering.comm):
             factor = Factor(blocks) if len(sewn) else NoFactor()
-        return cls(numbering, moved, forces, sewn, factor, 2 + int(coupling >= cls.stiff))
+        sweeps = 2 + int(coupling >= cls.stiff)
+        return cls(numbering, moved, forces, share, sewn, factor, sweeps)
 
     def eased(self, displacement: np.ndarray) -> np.ndarray:
         """Return an interface displacement with the same jumps that strains bodies less. Collective."""
@@ -118,12 +120,12 @@ class Sewing(NotSewn):
     def _solved(self, pulled: np.ndarray) -> np.ndarray:
         """Return Q times forces, both owned. Collective."""
         numbering = self.numbering
-        work = self.sweeps * (self.moved.nnz + self.forces.nnz + 2 * self.blocks.entries)
+        swept = (self.sweeps - 1) * self.share.nnz + 2 * self.sweeps * self.blocks.entries
+        work = self.moved.nnz + self.forces.nnz + swept
         count_flops(numbering.comm, 2 * work)
         total, left = self._sweep(pulled), pulled
         for _ in range(1, self.sweeps):
-            moved = self.forces @ numbering.to_local(total)
-            left = pulled - numbering.to_owned(self.moved.T @ moved)
+            left = pulled - numbering.to_owned(self.share @ numbering.to_local(total))
             total = total + self._sweep(left)
         return total
 
