@@ -243,10 +243,13 @@ class ContactWarnings:
     def _outline(self, scene: Scene, name: str) -> Outline:
         """Return the boundary of a body, which meshes of the same cells share."""
         mesh = scene.bodies[name].mesh
-        known = self._outlines.get(name)
-        if known is None or known[0].cells is not mesh.cells:
-            known = self._outlines[name] = (mesh, outline_of(mesh))
-        return known[1]
+        same = (
+            outline
+            for known, outline in self._outlines.values()
+            if known.cells is mesh.cells and known.hanging is mesh.hanging
+        )
+        self._outlines[name] = mesh, next(same, ()) or outline_of(mesh)
+        return self._outlines[name][1]
 
 
 class DeferredWarnings(ContactWarnings):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Self
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -360,15 +361,22 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
     return marks
 
 
+_KNOWN: WeakKeyDictionary[BodyMesh, dict[Hashable, FacetedSurface]] = WeakKeyDictionary()
+"""Surfaces of meshes that were asked for."""
+
+
 def surface_of(
     scene: SceneParts, surface: Surface, geometry: Geometry, *, finer: bool = False
 ) -> FacetedSurface:
     """Return a named surface; its normals lie in planes of symmetry that cut it, and go around sectors."""
-    body, marks = scene.bodies[surface.body], mirrored(scene, surface.body)
-    found = true_surface(
-        body.mesh, surface.name, geometry, mirrored=marks, planes=planes_of(scene), finer=finer,
-        measure=body.kinematics.measure,
-    )  # fmt: skip
+    body, marks, planes = scene.bodies[surface.body], mirrored(scene, surface.body), planes_of(scene)
+    measure, made = body.kinematics.measure, _KNOWN.setdefault(body.mesh, {})
+    key = surface.name, geometry, finer, measure, np.packbits(marks).tobytes(), planes.tobytes()
+    if key not in made:
+        made[key] = true_surface(
+            body.mesh, surface.name, geometry, mirrored=marks, planes=planes, finer=finer, measure=measure
+        )
+    found = made[key]
     known = (geometry == "best" or finer) and surface.name in body.mesh.origin.shapes
     neighbours = () if known else _neighbours(scene, surface.body)
     if not neighbours:

@@ -59,6 +59,7 @@ from fenics_contact import (
     gravity,
 )
 from fenics_contact._base.checks import checked
+from fenics_contact._scene.parts import surface_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -484,3 +485,14 @@ def test_checks_of_a_base_are_not_lost() -> None:
         Rope(-1.0, 3)
     with pytest.raises(InvalidInputError, match=r"Rope\.strands must be"):
         Rope(1.0, "three")  # type: ignore[arg-type]
+
+
+def test_a_surface_is_made_once_for_a_mesh_and_its_planes_of_symmetry() -> None:
+    mesh, side = block((0, 0, 0), (1, 1, 1), (2, 2, 1)), Surface("one", "z1")
+    free = Scene({"one": Body(mesh, STEEL)})
+    cut = replace(free, supports=[Roller("one", "x0")])
+    moved = replace(free, bodies={"one": replace(free.bodies["one"], mesh=mesh.moved(mesh.points + 1.0))})
+    first, other, away = (surface_of(scene, side, "best") for scene in (free, cut, moved))
+    assert surface_of(replace(free), side, "best") is first
+    assert other.mirrored.any() > first.mirrored.any()
+    np.testing.assert_allclose(away.points, first.points + 1.0)
