@@ -114,7 +114,7 @@ def refused(case: Trial, sentence: str, on_ranks: OnRanks) -> dict[str, Any]:
     for ranks in case.ranks:
         answer = on_ranks(sentence, ranks)
         assert answer.get("alike"), answer
-        assert answer["error"].startswith(case.error.__name__), answer
+        assert answer["error"].startswith(caught.type.__name__), answer
     return told(caught.value, f"refused: {caught.value}")
 
 
