@@ -23,7 +23,7 @@ from fenics_contact._equilibrium.peaks import coarse_peak, unmatched_nodes
 from fenics_contact._equilibrium.turning import Turning
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.local_axes import TILT
-from fenics_contact._scene.pair_geometry import Outline, bodies_near, outline_of, unpaired
+from fenics_contact._scene.pair_geometry import Outline, bodies_near, has_same_outline, outline_of, unpaired
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.plausible import odd_values
@@ -243,11 +243,7 @@ class ContactWarnings:
     def _outline(self, scene: Scene, name: str) -> Outline:
         """Return the boundary of a body, which meshes of the same cells share."""
         mesh = scene.bodies[name].mesh
-        same = (
-            outline
-            for known, outline in self._outlines.values()
-            if known.cells is mesh.cells and known.hanging is mesh.hanging
-        )
+        same = (outline for known, outline in self._outlines.values() if has_same_outline(known, mesh))
         self._outlines[name] = mesh, next(same, ()) or outline_of(mesh)
         return self._outlines[name][1]
 

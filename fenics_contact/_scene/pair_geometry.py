@@ -437,6 +437,11 @@ def outline_of(mesh: BodyMesh) -> Outline:
     return facets, cells[behind], cells
 
 
+def has_same_outline(one: BodyMesh, other: BodyMesh) -> bool:
+    """Return whether two meshes have the same cells, as moved ones do."""
+    return one.cells is other.cells and one.hanging is other.hanging
+
+
 def unpaired_bodies(scene: SceneParts) -> tuple[str, ...]:
     """Return in words which bodies nothing keeps apart, unloaded or where supports move them as if rigid.
 

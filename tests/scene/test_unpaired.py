@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact import Body, BodyMesh, Scene
+from fenics_contact._equilibrium import warnings as warned
 from fenics_contact._scene import pair_geometry
 from fenics_contact._scene.pair_geometry import OVERLAPPING, TOUCHING, outline_of, unpaired
 from fenics_contact.gallery import block, rectangle
@@ -67,3 +68,15 @@ def test_no_facet_is_left_out_that_touches_overlaps_or_passes(
     assert (seen > 0).all()
     assert quiet > 0
     assert left_out > 0
+
+
+def test_bodies_of_the_same_cells_have_one_boundary(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, steel = [], IsotropicElasticity(1.0, 0.3)
+    mesh, other = (block((0, 0, 0), (1, 1, 1), (count, 1, 1)) for count in (2, 3))
+    bodies = {"one": mesh, "moved": mesh.moved(mesh.points + 1.0), "other": other}
+    scene = Scene({name: Body(each, steel) for name, each in bodies.items()})
+    monkeypatch.setattr(warned, "outline_of", lambda each: made.append(each) or outline_of(each))
+    known = warned.ContactWarnings()
+    facets = [len(known._outline(scene, name)[0]) for name in [*bodies, *bodies]]
+    assert facets == 2 * [10, 10, 14]
+    assert len(made) == 2
