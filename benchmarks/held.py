@@ -21,8 +21,8 @@ class Held:
 
 
 HELD = {
-    "chain": Held(66528, 49),
-    "chain-1-rank": Held(66528, 49),
+    "chain": Held(66528, 41),
+    "chain-1-rank": Held(66528, 41),
     "chain-compared-1": Held(66528, 60),
     "chain-compared-2": Held(66528, 60),
     "chain-default": Held(72576, 33),
