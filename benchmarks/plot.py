@@ -17,7 +17,7 @@ from fenics_contact.study.figures import draw_stacked
 
 #: Where seconds stand beside a marker, so that those of lines close to each other do not meet.
 ABOVE = {"xytext": (0, 8), "ha": "center"}
-BESIDE = {"xytext": (10, 0), "va": "center"}
+BESIDE = {"xytext": (-9, 3), "ha": "right"}
 BELOW = {"xytext": (0, -8), "ha": "center", "va": "top"}
 
 
@@ -48,9 +48,9 @@ def _plot_blocks(axes: Any, summaries: Summaries) -> None:
     series = {
         "GetFEM, its contact brick": (["getfem-{}"], "s", "#b279a2", ABOVE),
         "monolithic Newton + MUMPS": (newton_names("{}"), "^", "#4c78a8", ABOVE),
-        "one linear solve by CG + GAMG": (["gamg-{}"], "v", "#54a24b", BELOW),
+        "one linear solve by CG + GAMG": (["gamg-{}"], "v", "#54a24b", BESIDE),
         "one linear solve by MUMPS's Cholesky": (["cholesky-{}"], "D", "#bab0ac", ABOVE),
-        "fenics_contact": (["block-{}"], "o", "#f58518", BESIDE),
+        "fenics_contact": (["block-{}"], "o", "#f58518", BELOW),
     }
     for label, (names, marker, colour, place) in series.items():
         points = []
