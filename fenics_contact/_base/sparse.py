@@ -288,23 +288,26 @@ class SharedFactor:
         """
         solution = np.empty(self.size)
         if self._holds:
-            solution = self.gathered(self.solve_own(right[self.own], refine=refine))
+            own = self.solve_own(right[self.own])
+            solution = self.gathered(self._refined() if refine else own)
         if self._comm.size > 1:
             self._comm.Bcast(solution)
         return solution
 
-    def solve_own(self, right: Vector, *, refine: bool = True) -> Vector:
-        """Return rows `own` of A⁻¹ times a vector with such rows. Collective on the holders."""
+    def solve_own(self, right: Vector) -> Vector:
+        """Return rows `own` of A⁻¹ times a vector with such rows, not refined. Collective on the holders."""
         check_not_forked()
-        scale = self._scale[self.own]
-        self._right.array_w[:] = scale * right
+        self._right.array_w[:] = self._scale[self.own] * right
         self._ksp.solve(self._right, self._left)
-        if refine:
-            self._matrix.mult(self._left, self._residual)
-            self._residual.aypx(-1.0, self._right)
-            self._ksp.solve(self._residual, self._correction)
-            self._left.axpy(1.0, self._correction)
-        return np.asarray(scale * self._left.array_r)
+        return np.asarray(self._scale[self.own] * self._left.array_r)
+
+    def _refined(self) -> Vector:
+        """Return the last solution, corrected for the shift. Collective on the holders."""
+        self._matrix.mult(self._left, self._residual)
+        self._residual.aypx(-1.0, self._right)
+        self._ksp.solve(self._residual, self._correction)
+        self._left.axpy(1.0, self._correction)
+        return np.asarray(self._scale[self.own] * self._left.array_r)
 
     def gathered(self, own: Vector) -> Vector:
         """Return a vector of which holders have rows `own`; zero but on the first. Collective on these."""

@@ -134,7 +134,7 @@ class SharedEliminated(Eliminated):
 
     def inner(self, right: Vector) -> Vector:
         """Return this rank's part of A_ii⁻¹ times a vector. Collective."""
-        return self.factor.solve_own(right, refine=False)
+        return self.factor.solve_own(right)
 
     def summed(self, share: Vector) -> Vector:
         """Return the sum over ranks. Collective."""
