@@ -23,7 +23,7 @@ from fenics_contact.materials.elastic import PlaneStress, isotropic_constants
 from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import simplices_in
-from fenics_contact.mesh.faces import boundary_faces, corners_of, vector_areas
+from fenics_contact.mesh.faces import corners_of, vector_areas
 from fenics_contact.mesh.quality import determinants
 from fenics_contact.shapes.combined import Joined, Placed
 from fenics_contact.shapes.simple import SurfaceShape, evaluate_shape, tangent_bases
@@ -432,9 +432,8 @@ class Unpaired:
 
 def outline_of(mesh: BodyMesh) -> Outline:
     """Return the boundary and the inside of a body, which depend on its cells alone."""
-    cells = mesh.linear.cells
-    facets, behind = boundary_faces(cells, mesh.dim, mesh.hanging)
-    return facets, cells[behind], cells
+    facets, behind = mesh.linear.boundary
+    return facets, mesh.linear.cells[behind], mesh.linear.cells
 
 
 def has_same_outline(one: BodyMesh, other: BodyMesh) -> bool:

@@ -331,6 +331,8 @@ class BodyMesh:
             check_chart(self.chart, points)
 
     def _set(self, **values: object) -> None:
+        if not values.keys().isdisjoint(("cells", "hanging")):
+            self.__dict__.pop("boundary", None)
         for name, value in values.items():
             object.__setattr__(self, name, value)
 

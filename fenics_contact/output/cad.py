@@ -22,7 +22,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, collectively, together
 from fenics_contact.gallery.links import DesignSurface
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces, vector_areas
+from fenics_contact.mesh.faces import vector_areas
 from fenics_contact.output.files import replacing
 from fenics_contact.output.surfaces import moved_body, moved_surfaces
 from fenics_contact.readers.gmsh_session import gmsh_model, silenced
@@ -184,7 +184,7 @@ def flat_sides(
     Sides are flat where they are so in the reference shape; the nodes of the mesh near a designed surface
     follow it a little.
     """
-    facets, _ = boundary_faces(mesh.linear.cells, mesh.dim, mesh.hanging)
+    facets, _ = mesh.linear.boundary
     areas = vector_areas(mesh.points, facets)
     across = _across(facets)
     labels = _labels(facets, areas, across, surfaces, angle)

@@ -12,7 +12,6 @@ from fenics_contact._base.checks import naming_arguments
 from fenics_contact.design.design import MovedSurface
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.mesh.cell_types import FACET_TYPES
-from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.output.files import replacing, write_text
 from fenics_contact.shapes.combined import CLOSE
 from fenics_contact.shapes.parametric import tensor_grid
@@ -171,7 +170,7 @@ def write_stl(
 
 def _triangles(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the points of the boundary and its triangles, outward."""
-    facets, _ = boundary_faces(mesh.linear.cells, mesh.dim, mesh.hanging)
+    facets, _ = mesh.linear.boundary
     triangles = facets[:, FACET_TYPES[facets.shape[1], 3].simplices].reshape(-1, 3)
     nodes, numbers = np.unique(triangles, return_inverse=True)
     return mesh.points[nodes], numbers.reshape(-1, 3)

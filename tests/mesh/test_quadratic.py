@@ -169,3 +169,10 @@ def test_a_mesh_of_dolfinx_has_the_quadratic_nodes() -> None:
     nodes, dofs = _dolfinx.node_dofs(space)
     place = space.tabulate_dof_coordinates()[dofs]
     np.testing.assert_allclose(place, mesh.points[nodes], atol=1e-14)
+
+
+def test_linear_cells_have_a_boundary_of_their_own() -> None:
+    mesh = quadratic(block((0, 0, 0), (1, 1, 1), (2, 1, 1)))
+    assert mesh.boundary[0].shape == (10, 9)
+    assert mesh.linear.boundary[0].shape == (40, 4)
+    np.testing.assert_array_equal(mesh.linear.boundary[0], boundary_faces(mesh.linear.cells)[0])
