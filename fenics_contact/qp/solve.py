@@ -18,6 +18,7 @@ from fenics_contact.qp.resting import LooseMotions
 from fenics_contact.qp.solution import (
     DualSolution,
     Iterate,
+    Residuals,
     SmalseMemory,
     SolverStep,
     Start,
@@ -334,17 +335,35 @@ def _solve_scaled(problem: DualProblem, solver: DualSolver, start: _Cold, attemp
     history: tuple[SolverStep, ...] = ()
     for _ in range(attempts):
         found = _solve_as_given(scaled, solver.with_tolerance(tolerance), start)
-        start = _SolvedBefore.at(found)
         products, history = products + found.products, (*history, *found.history)
         solution = _unscaled(problem, found)
         if solution.residuals.within(solver.tolerance):
             return replace(solution, products=products, iterations=len(history), history=history)
-        tolerance *= 0.3 * solver.tolerance / solution.residuals.worst
-        tolerance = min(tolerance, 0.3 * found.residuals.worst or tolerance)  # else nothing is left to do
+        tolerance, least = _sharper(tolerance, solver.tolerance, found.residuals, solution.residuals)
+        scaled = replace(scaled, least=least)
+        start = _SolvedBefore.at(replace(found, problem=scaled))
     raise ConvergenceError(
         f"residuals must be below {solver.tolerance:.1e}, got {solution.residuals} in {attempts} attempts",
         history,
     )
+
+
+def _sharper(
+    tolerance: float, aim: float, scaled: Residuals, unscaled: Residuals
+) -> tuple[float, LeastSizes]:
+    """Return the tolerance of the next attempt, and sizes by which it asks no more of what is met already.
+
+    Contact forces cannot be had as sharply as jumps of soft parts beside stiff ones may need.
+    """
+
+    def needed(got: float, of: float) -> float:
+        return tolerance if of <= aim else min(0.3 * tolerance * aim / of, 0.3 * got or tolerance)
+
+    natural = needed(scaled.natural, unscaled.natural)
+    gluing = needed(scaled.gluing, unscaled.gluing)
+    sharpest = min(natural, gluing, needed(scaled.coarse, unscaled.coarse))
+    force, jumps = scaled.force_scale * natural, scaled.gluing_scale * gluing
+    return sharpest, LeastSizes(force / sharpest, jumps / sharpest)
 
 
 def _unscaled(problem: DualProblem, solution: DualSolution) -> DualSolution:
