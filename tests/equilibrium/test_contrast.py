@@ -27,6 +27,7 @@ from fenics_contact import (
 )
 from fenics_contact.gallery import rectangle_lattice
 from fenics_contact.materials import PlaneStrain
+from fenics_contact.qp import FaceNewton
 from tests.equilibrium.checks import assert_solved
 from tests.equilibrium.contrast import FRICTION, Blocks, Regions
 
@@ -98,6 +99,15 @@ def test_a_stiff_body_on_one_a_million_times_softer_takes_no_more_work(slave: st
     state = solved(case, 1e6)
     assert_solved(state, 1e-6)
     assert state.counts["f_products"] < 2.5 * solved(case, 1.0).counts["f_products"]
+
+
+def test_jumps_of_soft_parts_are_sharpened_and_contact_forces_left_as_sharp_as_they_are() -> None:
+    """At a contrast of 1e6 jumps need five more digits than contact forces can have."""
+    scene = Regions("b", 0, True, FRICTION).scene(1e6)
+    cuts = {name: box_partition(body.mesh, (2, 3, 2)) for name, body in scene.bodies.items()}
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cuts, solver=FaceNewton(tolerance=1e-9))
+    assert_solved(state, 1e-9)
+    assert state.counts["f_products"] < 100
 
 
 def test_a_stiff_body_acts_on_a_soft_one_as_a_rigid_one() -> None:
