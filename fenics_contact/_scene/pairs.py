@@ -566,7 +566,7 @@ class Tie(PairPart):
 
     Attributes:
         slave: Surface whose nodes carry the forces; the finer mesh is the better slave.
-        master: Surface of another body.
+        master: Surface of another body, or another one of the same, as where a slit ring is closed.
         sliding: Whether the surfaces may slide along each other: contact known to be closed.
         discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` ties weighted
             means, ``"best"``, the default, leaves it to the scene. See `ContactPair`.
@@ -581,16 +581,22 @@ class Tie(PairPart):
     choice: Choice = field(default=NO_CHOICE, repr=False)
 
     def __post_init__(self) -> None:
-        """Reject a body that is tied to itself."""
-        if self.master.body == self.slave.body:
-            raise InvalidInputError(
-                f"body {self.slave.body!r} cannot be tied to itself: mesh it in one piece, or as two bodies"
-            )
+        """Reject a surface that is tied to itself."""
+        if self.slave == self.master:
+            raise InvalidInputError(f"Tie needs two surfaces, got {self.place}: name the other as master")
 
     def check(self, scene: Around) -> None:
-        """Reject surfaces that are not there."""
+        """Reject surfaces that are not there, and nodes that are on both of one body."""
         require_surface(scene, self.slave.body, self.slave.name, "Tie.slave")
         require_surface(scene, self.master.body, self.master.name, "Tie.master")
+        if self.slave.body == self.master.body:
+            mesh = scene.bodies[self.slave.body].mesh
+            both = np.intersect1d(mesh.surfaces[self.slave.name], mesh.surfaces[self.master.name])
+            if len(both):
+                raise InvalidInputError(
+                    f"surfaces of a Tie must have no node in common, {self.place} have {len(both)}, the "
+                    f"first at {mesh.points[both[0]].tolist()}: leave out facets that are joined"
+                )
 
 
 @tabled

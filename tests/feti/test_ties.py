@@ -14,10 +14,12 @@ from mpi4py import MPI
 
 from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     ContactProblem,
     Coulomb,
     FixedPoint,
+    Pressure,
     RigidPlane,
     RigidSurface,
     Scene,
@@ -34,7 +36,7 @@ from fenics_contact._pairing.search import find_tied_points
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicElasticity
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicElasticity, PlaneStress
 from fenics_contact.qp import FaceNewton, Smalse
 from fenics_contact.study import Parameters
 from fenics_contact.study.scenes import hertz
@@ -148,9 +150,41 @@ def test_a_master_that_only_a_held_slave_holds_is_told(slave: int, caplog: pytes
     assert any(warned) == (slave == 0)
 
 
-def test_a_body_cannot_be_tied_to_itself() -> None:
-    with pytest.raises(InvalidInputError, match="body 'ring' cannot be tied to itself: mesh it in one"):
-        Tie(Surface("ring", "a"), Surface("ring", "b"))
+def slit_ring(inner: float, outer: float, around: int, through: int, overlap: bool = False) -> BodyMesh:
+    """Return a ring that is slit along the x axis; with one more facet on its start if ``overlap``."""
+    flat = rectangle((-2.0 * np.pi, inner), (0.0, outer), (around, through))
+    angle, radius = flat.points.T
+    points = np.column_stack([radius * np.cos(angle), -radius * np.sin(angle)])
+    sides = {name: flat.surfaces[side] for name, side in (("start", "x1"), ("end", "x0"), ("bore", "y0"))}
+    if overlap:
+        sides["end"] = np.vstack([sides["end"], sides["start"][:1]])
+    return BodyMesh(points, flat.cells, sides, coincident_nodes=True)
+
+
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+def test_a_slit_ring_whose_ends_are_tied_is_a_ring(discretisation: str) -> None:
+    """Its inside moves by Lamé's p a / E ((b² + a²) / (b² − a²) + ν); left open it would gape."""
+    a, b, pressure = 1.0, 2.0, 0.5
+    mesh = slit_ring(a, b, 96, 16)
+    around = np.unique(mesh.surfaces["bore"])
+    mesh = replace(mesh, node_sets={"above": around[[np.argmax(mesh.points[around, 1])]]})
+    size = pressure * a / 1000.0 * ((b**2 + a**2) / (b**2 - a**2) + 0.3)
+    held = [Support("ring", "start", (None, 0.0)), Support("ring", "above", (0.0, None))]
+    closed = Tie(Surface("ring", "end"), Surface("ring", "start"), discretisation=discretisation)
+    material = PlaneStress(1000.0, 0.3)
+    scene = Scene({"ring": Body(mesh, material)}, held, [Pressure("ring", "bore", pressure)], ties=[closed])
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-9)
+    moved = state.gather_displacement("ring")[around]
+    radial = np.einsum("nd,nd->n", moved, mesh.points[around]) / a
+    np.testing.assert_allclose(radial, size, rtol=5e-3)
+
+
+def test_a_surface_tied_to_itself_or_to_one_that_it_shares_nodes_with_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="Tie needs two surfaces"):
+        Tie(Surface("ring", "a"), Surface("ring", "a"))
+    ring = {"ring": Body(slit_ring(1.0, 2.0, 12, 2, overlap=True), PlaneStress(1.0, 0.3))}
+    with pytest.raises(InvalidInputError, match=r"no node in common, .* have 2, the first"):
+        Scene(ring, ties=[Tie(Surface("ring", "end"), Surface("ring", "start"))])
 
 
 def test_an_unknown_discretisation_is_refused() -> None:
