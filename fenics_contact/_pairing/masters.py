@@ -473,6 +473,10 @@ class TiedMaster(BodyMaster):
             sides = (slave.surface, own), (self.surface, other)
             search.advice.free_master(self.pair, *sides, search.comm)
 
+    def movable(self, scene: Scene, nodes: np.ndarray) -> np.ndarray:
+        """Return all nodes but those of the master itself, of the same body."""
+        return ~np.isin(nodes, self.nodes)
+
 
 @dataclass(frozen=True)
 class SectorMaster(TiedMaster):

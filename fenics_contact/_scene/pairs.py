@@ -566,7 +566,8 @@ class Tie(PairPart):
 
     Attributes:
         slave: Surface whose nodes carry the forces; the finer mesh is the better slave.
-        master: Surface of another body, or another one of the same, as where a slit ring is closed.
+        master: Surface of another body, or another one of the same, as where a slit is closed; nodes that
+            are on both, as at its end, need no tie.
         sliding: Whether the surfaces may slide along each other: contact known to be closed.
         discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` ties weighted
             means, ``"best"``, the default, leaves it to the scene. See `ContactPair`.
@@ -586,17 +587,9 @@ class Tie(PairPart):
             raise InvalidInputError(f"Tie needs two surfaces, got {self.place}: name the other as master")
 
     def check(self, scene: Around) -> None:
-        """Reject surfaces that are not there, and nodes that are on both of one body."""
+        """Reject surfaces that are not there."""
         require_surface(scene, self.slave.body, self.slave.name, "Tie.slave")
         require_surface(scene, self.master.body, self.master.name, "Tie.master")
-        if self.slave.body == self.master.body:
-            mesh = scene.bodies[self.slave.body].mesh
-            both = np.intersect1d(mesh.surfaces[self.slave.name], mesh.surfaces[self.master.name])
-            if len(both):
-                raise InvalidInputError(
-                    f"surfaces of a Tie must have no node in common, {self.place} have {len(both)}, the "
-                    f"first at {mesh.points[both[0]].tolist()}: leave out facets that are joined"
-                )
 
 
 @tabled

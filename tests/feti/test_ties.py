@@ -37,6 +37,7 @@ from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicElasticity, PlaneStress
+from fenics_contact.mesh import boundary_faces
 from fenics_contact.qp import FaceNewton, Smalse
 from fenics_contact.study import Parameters
 from fenics_contact.study.scenes import hertz
@@ -150,14 +151,12 @@ def test_a_master_that_only_a_held_slave_holds_is_told(slave: int, caplog: pytes
     assert any(warned) == (slave == 0)
 
 
-def slit_ring(inner: float, outer: float, around: int, through: int, overlap: bool = False) -> BodyMesh:
-    """Return a ring that is slit along the x axis; with one more facet on its start if ``overlap``."""
+def slit_ring(inner: float, outer: float, around: int, through: int) -> BodyMesh:
+    """Return a ring that is slit along the x axis."""
     flat = rectangle((-2.0 * np.pi, inner), (0.0, outer), (around, through))
     angle, radius = flat.points.T
     points = np.column_stack([radius * np.cos(angle), -radius * np.sin(angle)])
     sides = {name: flat.surfaces[side] for name, side in (("start", "x1"), ("end", "x0"), ("bore", "y0"))}
-    if overlap:
-        sides["end"] = np.vstack([sides["end"], sides["start"][:1]])
     return BodyMesh(points, flat.cells, sides, coincident_nodes=True)
 
 
@@ -179,12 +178,35 @@ def test_a_slit_ring_whose_ends_are_tied_is_a_ring(discretisation: str) -> None:
     np.testing.assert_allclose(radial, size, rtol=5e-3)
 
 
-def test_a_surface_tied_to_itself_or_to_one_that_it_shares_nodes_with_is_refused() -> None:
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+def test_a_tie_closes_a_slit_up_to_its_end(discretisation: str) -> None:
+    """The node at the end of the slit is on both sides; the block is as if it were in one piece."""
+    whole = block((0, 0, 0), (2, 1, 2), (2, 1, 2))
+    side = np.flatnonzero((whole.points[:, 0] == 1.0) & (whole.points[:, 2] == 2.0))
+    points = np.vstack([whole.points, whole.points[side]])
+    right = (whole.points[whole.cells].mean(axis=1) > 1.0)[:, [0, 2]].all(axis=1)
+    cells = whole.cells.copy()
+    for number, node in enumerate(side):
+        cells[np.ix_(right, range(8))] = np.where(cells[right] == node, whole.n_nodes + number, cells[right])
+    faces, _ = boundary_faces(cells)
+    inner = np.isclose(points[faces].mean(axis=1)[:, 0], 1.0)
+    new = (faces >= whole.n_nodes).any(axis=1)
+    sides = {"right": faces[inner & new], "left": faces[inner & ~new]}
+    sides |= {name: whole.surfaces[name] for name in ("z0", "x1")}
+    slit = BodyMesh(points, cells, sides, coincident_nodes=True)
+    found = []
+    for mesh, ties in ((whole, []), (slit, [Tie(Surface("b", "right"), Surface("b", "left"))])):
+        ties = [replace(tie, discretisation=discretisation) for tie in ties]
+        top = [Traction("b", "x1", PUSH)]
+        scene = Scene({"b": Body(mesh, STEEL)}, [Support("b", "z0")], top, ties=ties)
+        found.append(solve_scene(scene, MPI.COMM_SELF, tolerance=1e-10).gather_displacement("b"))
+    np.testing.assert_allclose(found[1][: whole.n_nodes], found[0], rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(found[1][whole.n_nodes :], found[0][side], rtol=1e-7, atol=1e-12)
+
+
+def test_a_surface_cannot_be_tied_to_itself() -> None:
     with pytest.raises(InvalidInputError, match="Tie needs two surfaces"):
         Tie(Surface("ring", "a"), Surface("ring", "a"))
-    ring = {"ring": Body(slit_ring(1.0, 2.0, 12, 2, overlap=True), PlaneStress(1.0, 0.3))}
-    with pytest.raises(InvalidInputError, match=r"no node in common, .* have 2, the first"):
-        Scene(ring, ties=[Tie(Surface("ring", "end"), Surface("ring", "start"))])
 
 
 def test_an_unknown_discretisation_is_refused() -> None:
