@@ -19,6 +19,7 @@ from fenics_contact.decks.couplings import (
     read_driven,
     require_own_nodes,
 )
+from fenics_contact.decks.distributions import by_distribution
 from fenics_contact.decks.initial_stress import TensorGiven, read_initial
 from fenics_contact.decks.materials import MaterialCards, read_materials
 from fenics_contact.decks.multi_point import (
@@ -32,7 +33,7 @@ from fenics_contact.decks.multi_point import (
 )
 from fenics_contact.decks.pair_changes import PairChange, read_changes
 from fenics_contact.decks.steps import DeckSteps, read_steps
-from fenics_contact.decks.vocabulary import WITHOUT_EFFECT
+from fenics_contact.decks.vocabulary import IDLE_PARAMETERS, WITHOUT_EFFECT
 from fenics_contact.readers.deck_bodies import (
     Component,
     Exterior,
@@ -43,6 +44,7 @@ from fenics_contact.readers.deck_bodies import (
 )
 from fenics_contact.readers.deck_cards import Card, Origin
 from fenics_contact.readers.deck_mesh import DeckMesh, read_mesh_cards
+from fenics_contact.readers.deck_straightened import straightened
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +94,12 @@ class DeckCards:
     @classmethod
     def of(cls, name: str, cards: Sequence[Card], record: Record) -> DeckCards:
         """Sort the cards of a deck."""
-        mesh = read_mesh_cards(cards)
+        mesh = straightened(read_mesh_cards(cards), record.note)
         sections, of_element = read_sections(cards, mesh)
         materials, orientations = read_materials(cards)
+        mesh, sections, of_element, orientations = by_distribution(
+            cards, mesh, sections, of_element, orientations
+        )
         bolts, means = read_bolts(cards, mesh), read_means(cards, mesh)
         require_own_nodes([(each.card, each.node) for each in bolts], mesh)
         require_own_nodes([(each.card, each.node) for each in means], mesh)
@@ -132,8 +137,9 @@ class DeckCards:
         for card in self.cards:
             if card.name in WITHOUT_EFFECT and card.name != "HEADING":
                 self.note(card, f"has no effect here ({WITHOUT_EFFECT[card.name]})")
-            if card.name == "NSET" and "FREQUENCY" in card.parameters:
-                self.note(card, "FREQUENCY is of output, it has no effect on a set")
+            for name in card.parameters:
+                if (card.name, name) in IDLE_PARAMETERS:
+                    self.note(card, f"{name} {IDLE_PARAMETERS[card.name, name]}")
 
     def cut_where_loaded(self, steps: DeckSteps) -> DeckCards:
         """Return the cards with sections cut where loads on volumes act on a part of them."""

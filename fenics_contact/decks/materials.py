@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -56,7 +56,11 @@ def read_materials(cards: Sequence[Card]) -> tuple[dict[str, MaterialCards], dic
     return found, axes
 
 
-def _axes(card: Card | None) -> tuple[tuple[float, float, float], ...]:
+#: Axes of a material as rows.
+Axes: TypeAlias = tuple[tuple[float, float, float], ...]
+
+
+def _axes(card: Card | None) -> Axes:
     """Return the axes of a rectangular orientation as rows."""
     if card is None:
         return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -64,13 +68,27 @@ def _axes(card: Card | None) -> tuple[tuple[float, float, float], ...]:
         raise card.error(f"SYSTEM={card.name_of('SYSTEM')} is not supported: give rectangular axes")
     if card.name_of("DEFINITION") not in ("", "COORDINATES"):
         raise card.error("DEFINITION must be COORDINATES: give axes by the coordinates of two points")
-    numbers = card.floats(0)
-    if len(numbers) < 6 or len(card.lines) > 1:
-        raise card.error("needs one line with two points of three coordinates each: correct it", 0)
+    numbers = card.floats(0) if card.lines else []
+    if len(numbers) < 6 or len(card.lines) > 2:
+        raise card.error("needs a line with two points of three coordinates each, and at most another", 0)
     try:
-        return material_axes(numbers[:3], numbers[3:6])
+        rows = material_axes(numbers[:3], numbers[3:6])
     except InvalidInputError as error:
         raise card.error(str(error), 0) from error
+    return _turned(rows, card) if len(card.lines) > 1 else rows
+
+
+def _turned(rows: Axes, card: Card) -> Axes:
+    """Return axes that the second line of an orientation turns about one of them, by degrees."""
+    number, angle = [*card.floats(1), 0.0][:2]
+    if number not in (1, 2, 3):
+        raise card.error(f"needs an axis, 1, 2 or 3, and an angle, got {card.lines[1].strip()!r}", 1)
+    first, second = ((int(number) + k) % 3 for k in (0, 1))
+    axes, turn = np.array(rows), np.radians(angle)
+    turned = axes.copy()
+    turned[first] = np.cos(turn) * axes[first] + np.sin(turn) * axes[second]
+    turned[second] = np.cos(turn) * axes[second] - np.sin(turn) * axes[first]
+    return tuple((float(x), float(y), float(z)) for x, y, z in turned)
 
 
 def row_at(card: Card, width: int, temperature: float, what: str) -> list[float]:
@@ -263,8 +281,10 @@ def _curve(card: Card) -> tuple[float, Points]:
         raise card.error("needs a table of stress and plastic strain, it has no data line: add it")
     if np.ptp(rows[:, 2]) > 0.0:
         raise card.error("a yield stress that depends on the temperature is not read: give one temperature")
-    if rows[0, 1] != 0.0:
-        raise card.error(f"a table must begin at plastic strain zero, the first is {rows[0, 1]:g}", 0)
+    if rows[0, 1] < 0.0:
+        raise card.error(f"plastic strains must not be below zero, the first is {rows[0, 1]:g}", 0)
+    if rows[0, 1] > 0.0:  # the stress is the same before the first strain of the table
+        rows = np.vstack([[rows[0, 0], 0.0, 0.0], rows])
     return float(rows[0, 0]), tuple((float(strain), float(stress)) for stress, strain, _ in rows[1:])
 
 

@@ -17,7 +17,7 @@ MATERIAL_CARDS = {
 MESH_CARDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"}
 #: Cards of the model that are read.
 MODEL_CARDS = {
-    "SOLIDSECTION", "MATERIAL", "ORIENTATION", "AMPLITUDE", "INITIALCONDITIONS", "TRANSFORM",
+    "SOLIDSECTION", "MATERIAL", "ORIENTATION", "DISTRIBUTION", "AMPLITUDE", "INITIALCONDITIONS", "TRANSFORM",
     "CONTACTPAIR", "SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "CLEARANCE", "TIE", "RIGIDBODY",
     "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTINGCOUPLING", "EQUATION", "PRE-TENSIONSECTION",
     "CYCLICSYMMETRYMODEL", "MPC",
@@ -47,6 +47,11 @@ WITHOUT_EFFECT = {
     "MONITOR": "output",
     "TIMEPOINTS": "times of output",
     "RESTART": "output",
+    "DAMAGEINITIATION": "damage that is printed alone",
+    "SECTIONCONTROLS": "of hourglasses, which reduced integration has there",
+    "REFINEMESH": "solved on the mesh as it is given, where the other program refines it and solves again",
+    "USEREFINEDMESH": "solved on the mesh as it is given",
+    "DISTRIBUTIONTABLE": "names what the numbers of a *DISTRIBUTION are",
     "NODALTHICKNESS": "thickness of shells, of which there are none",
     "CONTROLS": "how the other program iterates",
     "SOLUTIONTECHNIQUE": "how the other program iterates",
@@ -55,6 +60,14 @@ WITHOUT_EFFECT = {
     "CONDUCTIVITY": "of heat that is conducted, which there is not",
     "SPECIFICHEAT": "of heat that is conducted, which there is not",
     "DAMPING": "of motions in time, of which there are none",
+}
+#: Parameters of cards that change nothing of what is solved here, and why.
+IDLE_PARAMETERS = {
+    ("NSET", "FREQUENCY"): "is of output, it has no effect on a set",
+    ("STEP", "UNSYMM"): "has no effect here (how the other program solves)",
+    ("STEP", "EXTRAPOLATION"): "has no effect here (how the other program iterates)",
+    ("STEP", "CONVERTSDI"): "has no effect here (how the other program iterates)",
+    ("SOLIDSECTION", "CONTROLS"): "has no effect here (hourglasses)",
 }
 #: Every card that is known.
 KNOWN = MATERIAL_CARDS | MESH_CARDS | MODEL_CARDS | STEP_CARDS | PRINT_CARDS | set(WITHOUT_EFFECT)
@@ -73,7 +86,7 @@ PARAMETERS: dict[str, set[str]] = {
     "NSET": {"NSET", "ELSET", "GENERATE", "UNSORTED", "FREQUENCY"},
     "ELSET": {"ELSET", "GENERATE"},
     "SURFACE": {"NAME", "TYPE"},
-    "SOLIDSECTION": {"ELSET", "MATERIAL", "ORIENTATION", "OFFSET"},  # of layers along their thickness
+    "SOLIDSECTION": {"ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "CONTROLS"},  # OFFSET of layers
     "MATERIAL": {"NAME"},
     "ELASTIC": {"TYPE"},
     "PLASTIC": {"HARDENING"},
@@ -83,6 +96,7 @@ PARAMETERS: dict[str, set[str]] = {
     "EXPANSION": {"TYPE", "ZERO"},
     "DENSITY": set(),
     "ORIENTATION": {"NAME", "SYSTEM", "DEFINITION"},
+    "DISTRIBUTION": {"NAME", "LOCATION", "TABLE"},
     "AMPLITUDE": {"NAME", "TIME", "DEFINITION", "SHIFTX", "SHIFTY", "VALUE", "USER"},
     "INITIALCONDITIONS": {"TYPE"},
     "TRANSFORM": {"NSET", "TYPE"},
@@ -101,7 +115,7 @@ PARAMETERS: dict[str, set[str]] = {
     "DISTRIBUTINGCOUPLING": {"ELSET"},
     "EQUATION": {"REMOVE"},
     "PRE-TENSIONSECTION": {"SURFACE", "NODE"},
-    "STEP": {"NLGEOM", "INC", "NAME", "PERTURBATION", "AMPLITUDE"},
+    "STEP": {"NLGEOM", "INC", "NAME", "PERTURBATION", "AMPLITUDE", "UNSYMM", "EXTRAPOLATION", "CONVERTSDI"},
     "CHANGEFRICTION": {"INTERACTION"},
     "CHANGESURFACEBEHAVIOR": {"INTERACTION"},
     "MODELCHANGE": {"TYPE", "REMOVE", "ADD"},

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fenics_contact.readers.deck_cards import Card, Instances, cards_of, plain, whole_numbers
+from fenics_contact.readers.deck_parameters import with_parameters
 
 FRAMES = {"PART", "ENDPART", "ASSEMBLY", "ENDASSEMBLY", "INSTANCE", "ENDINSTANCE"}
 """The cards that make up the structure."""
@@ -125,7 +126,7 @@ def read_cards(path: Path) -> list[Card]:
 
     ``INTERNAL`` says which sets a window of the other program hides.
     """
-    return in_one_piece([_shown(card) for card in cards_of(path)])
+    return in_one_piece([_shown(card) for card in with_parameters(cards_of(path))])
 
 
 def _shown(card: Card) -> Card:

@@ -338,26 +338,32 @@ def region_names(sections: Sequence[Section], part: Component) -> dict[int, str 
     return dict(zip(part.sections, names, strict=True))
 
 
-def _check_block(block: Block, points: np.ndarray) -> None:
-    """Reject elements without a positive Jacobian at their Gauss points, by their numbers."""
+def inverted(block: Block, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which elements have no positive Jacobian at all Gauss points, and the least of each of them."""
     places, whole = with_centres(points, {block.element.name: block.nodes}, block.element.dim)
     cells = one_array(whole, block.element.dim)
     bad = np.flatnonzero(thickness(places, cells) <= 0.0)
     bad = bad[thickness(places, cells[bad], AT_GAUSS_POINTS) <= 0.0] if len(bad) else bad
+    least = jacobians(places, cells[bad], AT_GAUSS_POINTS).min(axis=1) if len(bad) else np.zeros(0)
+    return bad, least
+
+
+def _check_block(block: Block, points: np.ndarray) -> None:
+    """Reject elements without a positive Jacobian at their Gauss points, by their numbers."""
+    bad, least = inverted(block, points)
     if len(bad):
-        least = jacobians(places, cells[bad], AT_GAUSS_POINTS).min(axis=1)
         worst = int(np.argmin(least))
-        at = ", ".join(f"{x:.6g}" for x in places[cells[bad[worst]]].mean(axis=0))
+        at = ", ".join(f"{x:.6g}" for x in points[block.nodes[bad[worst]]].mean(axis=0))
         first = map(block.card.label, block.numbers[bad[:5]].tolist())
         numbers = ", ".join(first) + (", ..." if len(bad) > 5 else "")
         ends = np.cumsum([line.strip().rstrip(",").count(",") + 1 for line in block.card.lines])
         width = 1 + len(block.element.written)
         row = int(np.searchsorted(ends, block.records[bad[0]] * width, side="right"))
         raise block.card.error(
-            f"every element must have a positive Jacobian at its Gauss points, {len(bad)} of {len(cells)} "
-            f"of type {block.element.name} are inverted or flat: {numbers}; the smallest is "
-            f"{least[worst]:.3g} in element {block.card.label(block.numbers[bad[worst]])} around ({at}): see "
-            "the order of their nodes, and their coordinates", row,
+            f"every element must have a positive Jacobian at its Gauss points, {len(bad)} of "
+            f"{len(block.nodes)} of type {block.element.name} are inverted or flat: {numbers}; the smallest "
+            f"is {least[worst]:.3g} in element {block.card.label(block.numbers[bad[worst]])} around ({at}): "
+            "see the order of their nodes, and their coordinates", row,
         )  # fmt: skip
 
 

@@ -57,6 +57,13 @@ class Element:
         return range(self.count)
 
     @cached_property
+    def edges(self) -> Sequence[tuple[int, int, int]]:
+        """Positions of the ends of its edges and of the nodes in their middles, without these nothing."""
+        corners = 1 + max(max(face) for face in self.faces)
+        inner = range(corners, self.count)
+        return [(*edge, n) for n, edge in zip(inner, _EDGES[self.shape], strict=False)]
+
+    @cached_property
     def face_nodes(self) -> Sequence[Sequence[int]]:
         """Positions of all nodes of its faces: corners, then those in the middle of edges."""
         corners = 1 + max(max(face) for face in self.faces)
@@ -159,6 +166,11 @@ class Collapsed(Element):
         whole = _FACES["hexahedron" if self.dim == 3 else "quadrilateral"]
         kept = (tuple(dict.fromkeys(self.onto[place] for place in face)) for face in whole)
         return [face if len(face) >= self.dim else () for face in kept]
+
+    @property
+    def edges(self) -> Sequence[tuple[int, int, int]]:  # type: ignore[override]
+        """No edges with nodes in their middles."""
+        return []
 
     @property
     def face_nodes(self) -> Sequence[Sequence[int]]:  # type: ignore[override]

@@ -150,7 +150,7 @@ def test_21_stiffnesses_are_in_their_places(tmp_path: Path) -> None:
         ("*HYPERFOAM\n1., 2., 0.1\n", False, r"needs NLGEOM in its \*STEP"),
         ("*HYPERFOAM\n1., 2., 0.6\n", True, r"poisson_ratios must lie between 0 and 0.5"),
         ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.2\n", True, r"compressibility terms D2, D3"),
-        (STEEL + "*PLASTIC\n3., 0.1\n4., 0.2\n", False, r"a table must begin at plastic strain zero"),
+        (STEEL + "*PLASTIC\n3., -0.1\n4., 0.2\n", False, r"plastic strains must not be below zero"),
         (
             STEEL + "*PLASTIC\n3., 0.\n4., 0.2\n5., 0.1\n",
             False,
