@@ -12,15 +12,14 @@ from fenics_contact.decks.contact import Interaction, Sides, read_interactions, 
 from fenics_contact.decks.couplings import (
     Bolt,
     Driven,
-    LocalAxes,
-    in_global_axes,
-    read_axes,
     read_bolts,
     read_driven,
     require_own_nodes,
 )
 from fenics_contact.decks.distributions import by_distribution
 from fenics_contact.decks.initial_stress import TensorGiven, read_initial
+from fenics_contact.decks.linear_couplings import LinearCoupling, Nodes, led, read_linear
+from fenics_contact.decks.local_axes import LocalAxes, in_global_axes, read_axes
 from fenics_contact.decks.materials import MaterialCards, read_materials
 from fenics_contact.decks.multi_point import (
     Equation,
@@ -31,6 +30,7 @@ from fenics_contact.decks.multi_point import (
     read_points,
     shared_out,
 )
+from fenics_contact.decks.outside import reduced
 from fenics_contact.decks.pair_changes import PairChange, read_changes
 from fenics_contact.decks.steps import DeckSteps, read_steps
 from fenics_contact.decks.vocabulary import IDLE_PARAMETERS, WITHOUT_EFFECT
@@ -65,9 +65,9 @@ class Record:
 class DeckCards:
     """The cards of a deck, sorted.
 
-    `of_element`: number of the section of each element; `driven`: surfaces that nodes drive or load; `means`:
-    nodes that move as means of others; `changes`: what each step changes of contact pairs, None where it
-    changes nothing.
+    `of_element`: number of the section of each element; `driven`: surfaces that nodes drive or load;
+    `linear`: those that equations couple to nodes; `means`: nodes that move as means of others; `changes`:
+    what each step changes of contact pairs, None where it changes nothing.
     """
 
     name: str
@@ -83,6 +83,7 @@ class DeckCards:
     stress: TensorGiven
     strain: TensorGiven
     driven: Sequence[Driven]
+    linear: Sequence[LinearCoupling]
     bolts: Sequence[Bolt]
     means: Sequence[Mean]
     equations: Sequence[Equation]
@@ -118,7 +119,8 @@ class DeckCards:
             orientations=orientations,
             stress=read_initial(cards, mesh, record.note, "STRESS"),
             strain=read_initial(cards, mesh, record.note, "PLASTICSTRAIN"),
-            driven=read_driven(cards, mesh),
+            driven=read_driven(cards, mesh, orientations),
+            linear=read_linear(cards, mesh, orientations),
             bolts=bolts,
             means=means,
             equations=read_equations(cards, mesh),
@@ -190,20 +192,33 @@ class DeckCards:
     def references(self) -> np.ndarray:
         """Which nodes drive surfaces, draw bolts or are means of others, (n_nodes,)."""
         mark = np.zeros(len(self.mesh.points) + 1, dtype=bool)  # the last is that of −1
-        driving = [node for each in self.driven for node in (each.node, each.turning)]
+        driving = [node for each in self.driven for node in each.reserved]
         mark[[*driving, *(each.node for each in self.bolts), *(each.node for each in self.means)]] = True
         return mark[:-1]
 
 
-def steps_of(deck: DeckCards) -> DeckSteps:
-    """Return the steps of a deck: its equations, and forces along x, y and z per unit of thickness."""
+def steps_of(deck: DeckCards) -> tuple[DeckCards, DeckSteps]:
+    """Return the steps of a deck: its equations, and forces along x, y and z per unit of thickness.
+
+    The deck comes back with the rigid surfaces that equations join.
+    """
     steps = read_steps(deck.cards, deck.mesh)
     held = [~np.isnan(instant.held) for instant in steps.instants]
-    equations = [*deck.equations, *read_points(deck.cards, deck.mesh, steps.large)]
-    equations += mean_equations(deck.means, np.any(held, axis=0)) if held else ()
+    ever = np.any([np.zeros((len(deck.inside), 6), dtype=bool), *held], axis=0)
+    nodes = Nodes(deck.mesh, deck.inside, deck.axes)
+    given = [*deck.equations, *read_points(deck.cards, deck.mesh, steps.large)]
+    given += [e for each in deck.linear for e in each.equations(nodes)]
+    driven, given = led(deck.driven, given, nodes, steps.large)
+    deck = replace(deck, driven=driven)
+    given += mean_equations(deck.means, ever) if held else ()
+    moving = np.tile(deck.inside[:, None], 6)
+    moving[:, 3:] = False
+    found = reduced(given, ~(moving | ever | deck.references[:, None]), moving)
     deck.axes.check(steps)
 
     def shared(forces: np.ndarray) -> np.ndarray:
-        return shared_out(in_global_axes(forces, deck.axes.rows), deck.means) / deck.thickness
+        along = in_global_axes(forces, deck.axes.rows)
+        along = found.forces(forces, along, deck.axes, deck.mesh)
+        return shared_out(along, deck.means) / deck.thickness
 
-    return replace(steps.with_forces(shared), equations=equations)
+    return deck, replace(steps.with_forces(shared), equations=found.equations)

@@ -1,4 +1,4 @@
-"""What drives surfaces by a node: rigid bodies, couplings and bolts; equations; local axes of nodes."""
+"""What drives surfaces by a node: rigid bodies, couplings and bolts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.supports import RigidSurface
-from fenics_contact.decks.steps import DeckSteps, Instant
+from fenics_contact.decks.local_axes import oriented
+from fenics_contact.decks.steps import Instant
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import NO_NODES, DeckMesh, Faces
 
@@ -21,7 +22,8 @@ class Driven:
     `surface`: name of the surface in the deck, or "" for nodes; `nodes`: its nodes, none for those of a
     surface or of elements; `node`: position of the node whose displacements, or whose forces, are those of
     its point; `turning`: position of the node whose displacements are its rotation, −1 if `node` has
-    rotations; `spread`: whether the surface stays flexible, and only forces are given.
+    rotations; `spread`: whether the surface stays flexible, and only forces are given; `axes`: rows, along
+    which forces and moments are given.
     """
 
     card: Card
@@ -32,33 +34,69 @@ class Driven:
     turning: int
     spread: bool
 
-    def row(self, values: np.ndarray) -> np.ndarray:
-        """Return displacements and rotations, or forces and moments, of the node from those of all, (6,)."""
+    axes: Sequence[Sequence[float]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+    @property
+    def reserved(self) -> list[int]:
+        """The nodes whose displacements and forces are those of the surface; −1 is none."""
+        return [self.node, self.turning]
+
+    def motion(self, instant: Instant) -> np.ndarray:
+        """Return displacements and rotations of the node at a time, NaN where it is free, (6,)."""
+        return self._row(instant.held)
+
+    def load(self, instant: Instant) -> np.ndarray:
+        """Return forces and moments on the node at a time along x, y and z, (6,)."""
+        local = self._row(instant.forces).reshape(2, 3)
+        return np.asarray((local @ np.array(self.axes)).ravel())
+
+    def _row(self, values: np.ndarray) -> np.ndarray:
         turned = values[self.node, 3:] if self.turning < 0 else values[self.turning, :3]
         return np.concatenate([values[self.node, :3], turned])
 
 
-def read_driven(cards: Sequence[Card], mesh: DeckMesh) -> list[Driven]:
-    """Return rigid bodies and couplings."""
+@dataclass(frozen=True, eq=False)
+class TurnedAlone(Driven):
+    """A rigid surface that only a node of rotations drives: it moves as it likes."""
+
+    def motion(self, instant: Instant) -> np.ndarray:
+        """Return displacements, which are free, and rotations of the node at a time, (6,)."""
+        return np.concatenate([np.full(3, np.nan), instant.held[self.turning, :3]])
+
+    def load(self, instant: Instant) -> np.ndarray:
+        """Return no forces, and moments on the node at a time, (6,)."""
+        return np.concatenate([np.zeros(3), instant.forces[self.turning, :3]])
+
+
+def read_driven(cards: Sequence[Card], mesh: DeckMesh, orientations: Mapping[str, Card]) -> list[Driven]:
+    """Return rigid bodies and couplings of whole surfaces; others are linear ones."""
     found = []
     for k, card in enumerate(cards):
         if card.name == "RIGIDBODY":
             found.append(_rigid_body(card, mesh))
         elif card.name == "COUPLING":
-            if "ORIENTATION" in card.parameters:
-                raise card.error("ORIENTATION is not read here: give displacements along x, y and z")
-            kind = cards[k + 1] if k + 1 < len(cards) else card
-            if kind.name not in ("KINEMATIC", "DISTRIBUTING"):
-                raise card.error("must be followed by *KINEMATIC or *DISTRIBUTING: add one")
-            held = {c for row in range(len(kind.lines)) for c in _range(kind, row)} or set(range(1, 7))
+            kind, held = coupled(cards, k)
             if kind.name == "KINEMATIC" and not {1, 2, 3} <= held:
-                raise kind.error("a surface moves as one piece where components 1 to 3 are coupled")
+                continue
             node = mesh.nodes_named(card.required("REFNODE"), card)[0]
             surface = card.required("SURFACE")
             mesh.surface_named(surface, card)
             name = card.name_of("CONSTRAINTNAME") or surface
-            found.append(Driven(card, name, surface, NO_NODES, int(node), -1, kind.name == "DISTRIBUTING"))
+            spread = kind.name == "DISTRIBUTING"
+            given = Driven(card, name, surface, NO_NODES, int(node), -1, spread)
+            if card.name_of("ORIENTATION") and spread:
+                rows = oriented(card, orientations, mesh.points[[int(node)]])[0]
+                given = replace(given, axes=rows.tolist())
+            found.append(given)
     return found
+
+
+def coupled(cards: Sequence[Card], place: int) -> tuple[Card, set[int]]:
+    """Return the card behind a *COUPLING, which must be its kind, and the components it couples, from one."""
+    kind = cards[place + 1] if place + 1 < len(cards) else cards[place]
+    if kind.name not in ("KINEMATIC", "DISTRIBUTING"):
+        raise cards[place].error("must be followed by *KINEMATIC or *DISTRIBUTING: add one")
+    return kind, {c for row in range(len(kind.lines)) for c in _range(kind, row)} or set(range(1, 7))
 
 
 def by_node(driven: Sequence[Driven], mesh: DeckMesh) -> list[list[Driven]]:
@@ -70,6 +108,10 @@ def by_node(driven: Sequence[Driven], mesh: DeckMesh) -> list[list[Driven]]:
         if others and (each.spread or others[0].spread):
             node = mesh.numbers[each.node]
             raise each.card.error(f"node {node} of a distributing coupling is also of {others[0].name!r}")
+        if others and isinstance(each, TurnedAlone):
+            raise each.card.error(
+                f"its ROT NODE is also of {others[0].name!r}: give each its own, or REF NODE"
+            )
         first = turned.setdefault(each.turning, each) if each.turning >= 0 else each
         for other in (*others[:1], first):
             if (other.node, other.turning) != (each.node, each.turning):
@@ -101,8 +143,10 @@ def _rigid_body(card: Card, mesh: DeckMesh) -> Driven:
     else:
         name = card.required("ELSET")
         nodes = NO_NODES
-    node = int(mesh.nodes_named(card.required("REFNODE"), card)[0])
     turning = int(mesh.nodes_named(card.name_of("ROTNODE"), card)[0]) if card.name_of("ROTNODE") else -1
+    if turning >= 0 and not card.name_of("REFNODE"):
+        return TurnedAlone(card, name, "", nodes, turning, turning, False)
+    node = int(mesh.nodes_named(card.required("REFNODE"), card)[0])
     return Driven(card, name, "", nodes, node, turning, False)
 
 
@@ -110,7 +154,7 @@ def rigid_surface(driven: Driven, body: str, surface: str, at: np.ndarray, insta
     """Return the rigid surface of a node at a time."""
     dim = len(at)
     turns = [3, 4, 5] if dim == 3 else [5]
-    held, force = driven.row(instant.held), driven.row(instant.forces)
+    held, force = driven.motion(instant), driven.load(instant)
     free = np.isnan(held)
     motion = [None if loose else float(value) for value, loose in zip(held, free, strict=True)]
     load = np.where(free, force, 0.0).tolist()
@@ -173,83 +217,3 @@ def drawn(bolt: Bolt, held: Preload, instant: Instant, before: Instant) -> Itera
         yield replace(held, force=bolt.sense * float(force))
     elif before.held[bolt.node, 0] != shortening and not instant.fixed[bolt.node, 0]:
         yield replace(held, shortening=bolt.sense * float(shortening))
-
-
-@dataclass(frozen=True, eq=False)
-class LocalAxes:
-    """Axes of some nodes along which components are counted.
-
-    `rows`: position of a node -> its axes as rows; `on_axis`: cards of cylinders, and nodes on the axis,
-    where no direction is the radial one.
-    """
-
-    mesh: DeckMesh
-    rows: Mapping[int, np.ndarray]
-    on_axis: Sequence[tuple[Card, np.ndarray]]
-
-    def turned(self, nodes: np.ndarray) -> np.ndarray:
-        """Return which nodes have axes of their own, (n,)."""
-        return np.isin(nodes, np.fromiter(self.rows, dtype=np.int64))
-
-    def of(self, node: int) -> np.ndarray:
-        """Return the axes of a node as rows."""
-        return self.rows.get(node, np.eye(3))
-
-    def check(self, steps: DeckSteps) -> None:
-        """Reject nodes on the axis of a cylinder that are held or loaded along one direction across it."""
-        for card, nodes in self.on_axis:
-            for instant in steps.instants:
-                held, force = instant.held[nodes, :2], instant.forces[nodes, :2]
-                wrong = np.isnan(held[:, 0]) != np.isnan(held[:, 1])
-                wrong |= np.nan_to_num(held).any(axis=1) | force.any(axis=1)
-                if wrong.any():
-                    node = self.mesh.numbers[nodes[wrong][0]]
-                    raise card.error(f"node {node} is on the axis of the cylinder: hold 1 and 2 at zero")
-
-
-def read_axes(cards: Sequence[Card], mesh: DeckMesh) -> LocalAxes:
-    """Return the local axes of nodes."""
-    found: dict[int, np.ndarray] = {}
-    on_axis = []
-    for card in cards:
-        if card.name != "TRANSFORM":
-            continue
-        nodes = mesh.nodes_named(card.required("NSET"), card)
-        kind = card.name_of("TYPE") or "R"
-        numbers = card.floats(0) if card.lines else []
-        if kind not in ("R", "C") or len(numbers) < 6:
-            raise card.error("needs TYPE=R or C and a line with two points: complete it")
-        first, second = np.array(numbers[:3]), np.array(numbers[3:6])
-        if kind == "R":
-            axes = np.tile(_frame(first, second), (len(nodes), 1, 1))
-        else:
-            along = (second - first) / np.linalg.norm(second - first)
-            arms = mesh.points[nodes] - first
-            out = arms - np.outer(arms @ along, along)
-            size = np.linalg.norm(out, axis=1)
-            # On the axis any direction serves as the radial one where both across it are held alike.
-            near = size <= 1e-9 * np.abs(arms).max()
-            on_axis.append((card, nodes[near]))
-            out[near] = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-            out /= np.linalg.norm(out, axis=1)[:, None]
-            axes = np.stack([out, np.cross(along, out), np.tile(along, (len(nodes), 1))], axis=1)
-        found.update(zip(nodes.tolist(), axes, strict=True))
-    return LocalAxes(mesh, found, on_axis)
-
-
-def _frame(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return orthonormal axes: the first direction, and one in the plane of both."""
-    x = first / np.linalg.norm(first)
-    z = np.cross(first, second)
-    z /= np.linalg.norm(z)
-    return np.stack([x, np.cross(z, x), z])
-
-
-def in_global_axes(values: np.ndarray, axes: Mapping[int, np.ndarray]) -> np.ndarray:
-    """Return forces of nodes, (n_nodes, 6), with those of nodes with local axes along x, y and z."""
-    if not axes:
-        return values
-    result, nodes = values.copy(), np.fromiter(axes, dtype=np.int64)
-    turn = np.stack([axes[node] for node in nodes.tolist()])
-    result[nodes, :3] = np.einsum("nad,na->nd", turn, values[nodes, :3])
-    return result

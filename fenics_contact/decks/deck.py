@@ -233,7 +233,7 @@ def _read(path: Path, chosen: Chosen = _all) -> Deck:
     refuse_unknown(cards)
     try:
         deck = DeckCards.of(path.name, cards, record)
-        steps = steps_of(deck)
+        deck, steps = steps_of(deck)
         deck = deck.cut_where_loaded(steps)
         deck.note_without_effect()
         built = bodies_of(deck, steps, names_of(deck, steps))

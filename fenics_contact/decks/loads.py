@@ -87,9 +87,9 @@ class LoadBuilder:
             raise driven.card.error(
                 f"a distributing coupling must load one body, {driven.name!r} is also on {', '.join(others)}"
             )
-        if not np.isnan(driven.row(instant.held)).all():
+        if not np.isnan(driven.motion(instant)).all():
             raise driven.card.error("the node of a distributing coupling is held: take *KINEMATIC")
-        dim, load = self.built.deck.dim, driven.row(instant.forces).tolist()
+        dim, load = self.built.deck.dim, driven.load(instant).tolist()
         at = self.built.deck.mesh.points[driven.node, :dim]
         moment: Any = tuple(load[3:]) if dim == 3 else load[5]
         given = moment if np.any(moment) else None

@@ -43,13 +43,19 @@ def read_equations(cards: Sequence[Card], mesh: DeckMesh) -> list[Equation]:
                     raise card.error(f"needs {count} terms of node, component and factor", first)
                 entries += [entry for entry in card.rows[row] if entry]
             nodes = [mesh.nodes_named(token, card, row) for token in entries[: 3 * count : 3]]
-            if any(len(each) != 1 for each in nodes):
-                raise card.error("needs single nodes, got a set of several: write an equation for each", row)
+            several = [len(each) for each in nodes if len(each) != 1]
+            if len(several) > 1 or 0 in several:
+                raise card.error("needs nodes and at most one set, got more: write an equation for each", row)
             numbers = [card.number(token, row) for token in entries[2 : 3 * count : 3]]
             parts = [card.whole(token, row) - 1 for token in entries[1 : 3 * count : 3]]
             if not all(0 <= part < 6 for part in parts):
                 raise card.error(f"components must be from 1 to 6, got {1 + min(parts)}: correct them", row)
-            found.append(Equation(card, first, tuple(int(n[0]) for n in nodes), tuple(parts), tuple(numbers)))
+            columns = np.broadcast_arrays(*nodes)
+            found += [
+                Equation(card, first, own, tuple(parts), tuple(numbers))
+                for own in zip(*(each.tolist() for each in columns), strict=True)
+                if any(np.bincount(parts, numbers)) or len(set(own)) > 1  # a node of a set with itself
+            ]
             row += 1
     return found
 

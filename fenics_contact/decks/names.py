@@ -363,7 +363,7 @@ def _check_target(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.nda
     """Reject what cannot be held; `nodes`: those of the target that belong to elements."""
     _check_turns(deck, steps, target, nodes)
     _check_plane(deck, steps, target, nodes)
-    driving = {node for driven in deck.driven for node in (driven.node, driven.turning)}
+    driving = {node for driven in deck.driven for node in driven.reserved}
     here = [node for node in target.nodes.tolist() if node in driving]
     if any(at.kept[node, list(target.components)].any() for at in steps.instants for node in here):
         raise target.error(
@@ -403,7 +403,7 @@ def _check_plane(deck: DeckCards, steps: DeckSteps, target: Held, nodes: np.ndar
 def _check_equation(deck: DeckCards, steps: DeckSteps, equation: Equation) -> None:
     """Reject equations of what has no displacement, or no value."""
     at, components = np.array(equation.nodes), np.array(equation.components)
-    inside = deck.inside[at]
+    inside = deck.inside[at] & (components < 3)
     turned = (components >= deck.dim) & inside
     if turned.any():
         raise equation.error(
@@ -419,7 +419,8 @@ def _check_equation(deck: DeckCards, steps: DeckSteps, equation: Equation) -> No
     for node, component in zip(at[~inside], components[~inside], strict=True):
         if any(np.isnan(instant.held[node, component]) for instant in steps.instants):
             raise equation.error(
-                f"node {deck.mesh.numbers[node]} has no element: give component {component + 1} by *BOUNDARY"
+                f"component {component + 1} of node {deck.mesh.numbers[node]}, which no element has, is held "
+                "in some steps alone: hold it by *BOUNDARY in all, or in none"
             )
 
 

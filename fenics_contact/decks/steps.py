@@ -418,8 +418,13 @@ def _step(
     ]
     large = bool(before) and before[-1].large  # once it is there it stays
     if "NLGEOM" in head.parameters:
-        large = plain(head.parameters["NLGEOM"]) in ("", "YES")
+        large = is_large(head)
     return Step(head, _name(head, before), large, instants)
+
+
+def is_large(head: Card) -> bool:
+    """Return whether a *STEP asks for large deformations itself."""
+    return plain(head.parameters.get("NLGEOM", "NO")) in ("", "YES")
 
 
 def _name(head: Card, before: Sequence[Step]) -> str:

@@ -99,7 +99,7 @@ class SupportBuilder:
     def _rigid_bodies(self, driven: Driven, name: str) -> list[str]:
         """Return the bodies with a rigid surface of their own; others follow that of the first one."""
         bodies, motions = self.built.bodies_with(name), self.built.deck.motions
-        held = [driven.row(instant.held)[motions] for instant in self.built.steps.instants]
+        held = [driven.motion(instant)[motions] for instant in self.built.steps.instants]
         if len(bodies) == 1 or (held and not np.isnan(held).any()):
             return bodies
         sizes = [len(spread_out(self.built.meshes[b].points[self._nodes(b, name)])) for b in bodies]
@@ -164,7 +164,7 @@ class SupportBuilder:
         """Return how points move with others of one rigid piece, (n, components, m, dim)."""
         deck, steps = self.built.deck, self.built.steps
         turned = [k for k in deck.motions if k > 2]
-        turns = any((driven.row(instant.held)[turned] != 0.0).any() for instant in steps.instants)
+        turns = any((driven.motion(instant)[turned] != 0.0).any() for instant in steps.instants)
         weights = in_their_space(points, leaders) if turns else np.ones((len(points), 1))
         if weights is not None:
             components = np.eye(deck.dim)[1:] if deck.kind == "axisymmetric" else np.eye(deck.dim)
@@ -199,7 +199,7 @@ class SupportBuilder:
             mine, inner = parts.within(body, np.unique(node))
             owned = parts.owned(body, mine)
             mine, inner = mine[owned], inner[owned]
-            here = np.flatnonzero(np.isin(node, mine))
+            here = np.flatnonzero(np.isin(node, mine) & (component < 3))
             if len(here):
                 own = inner[np.searchsorted(mine, node[here])]
                 vectors = along[here, : self.built.deck.dim]
@@ -209,7 +209,7 @@ class SupportBuilder:
     def values(self, instant: Instant) -> Mapping[str, Any] | None:
         """Return the values of equations at a time, of nodes without elements; None without any."""
         number, node, component, factor = self._entries
-        outside = ~self.built.deck.inside[node]
+        outside = ~self.built.deck.inside[node] | (component > 2)
         if not outside.any():
             return None
         count, moved = int(number.max()) + 1, instant.held[node[outside], component[outside]]

@@ -262,7 +262,8 @@ def _differences(matrix: sp.csr_matrix, most: int = 12) -> sp.csr_matrix:
     busy = np.flatnonzero(np.bincount(matrix.indices, minlength=matrix.shape[1]) > most)
     for column in busy:  # those that many rows share are few
         entries = matrix[:, [column]].tocoo()
-        order = np.argsort(entries.row)
+        # Large factors are last: a row to which many times the next one is added would be lost in it.
+        order = np.lexsort((entries.row, np.log2(np.abs(entries.data)) // 8))
         row, value = entries.row[order], entries.data[order]
         if len(row) <= most:
             continue

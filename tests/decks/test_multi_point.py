@@ -12,22 +12,12 @@ from fenics_contact import CyclicSymmetry, RigidSurface, read_scene_file
 from fenics_contact.decks import DeckError, read_deck, write_scene_file
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.gallery import block
+from tests.decks.solved import solved
 from tests.decks.texts import FIXED, SECTION, STEEL, deck, mesh_cards, step
 from tests.decks.texts import PLAIN_BAR as BAR
 
 #: A node without elements whose coordinates are the axis of the bar.
 PILOT = "*NODE\n700, 2., 0., 0.\n"
-
-
-def solved(folder: Path, text: str, tolerance: float = 1e-11):
-    """The deck, its last state, and displacements and places of nodes by their numbers."""
-    found = read_deck(deck(folder, text))
-    state = found.solve(MPI.COMM_SELF, tolerance=tolerance)[-1]
-    moved, places = {}, {}
-    for body, numbers in found.node_numbers.items():
-        moved |= dict(zip(numbers.tolist(), state.gather_displacement(body), strict=True))
-        places |= dict(zip(numbers.tolist(), found.scene.bodies[body].mesh.points, strict=True))
-    return found, state, moved, places
 
 
 def test_the_mean_rotation_of_an_end_is_given(tmp_path: Path) -> None:

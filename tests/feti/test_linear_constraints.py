@@ -449,3 +449,24 @@ def test_equal_terms_are_equal() -> None:
     assert LinearConstraint([one]) == LinearConstraint([other])
     changed = with_values([LinearConstraint([one], name="n")], {"n": 2.0})
     assert changed[0].key == LinearConstraint([other]).key
+
+
+def test_factors_that_differ_by_orders_all_hold() -> None:
+    """Many nodes follow one, some with factors of 1e-10: no equation is lost in one of its neighbours."""
+    mesh = block((0, 0, 0), (4, 1, 1), (4, 3, 3))
+    top = np.flatnonzero(mesh.points[:, 2] == 1.0)
+    leader, *others = top[np.argsort(-mesh.points[top, 0], kind="stable")].tolist()
+    factor = np.where(np.arange(len(others)) % 2, 1.0, 1e-10)
+    terms = [
+        ConstraintTerm("bar", others, "z", 1.0, np.arange(len(others))),
+        ConstraintTerm("bar", np.full(len(others), leader), "z", -factor, np.arange(len(others))),
+    ]
+    scene = Scene(
+        {"bar": Body(mesh, STEEL)},
+        [Support("bar", "z0", (0.0, 0.0, 0.0))],
+        [Traction("bar", "z1", (0.0, 0.0, 3.0))],
+        constraints=[LinearConstraint(terms)],
+    )
+    moved = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-10).gather_displacement("bar")[:, 2]
+    assert moved[leader] > 1e-4
+    np.testing.assert_allclose(moved[others], factor * moved[leader], rtol=0.0, atol=1e-9 * moved[leader])
