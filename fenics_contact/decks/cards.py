@@ -32,6 +32,7 @@ from fenics_contact.decks.multi_point import (
 )
 from fenics_contact.decks.outside import reduced
 from fenics_contact.decks.pair_changes import PairChange, read_changes
+from fenics_contact.decks.springs import NodeMass, NodeSpring, read_masses, read_springs
 from fenics_contact.decks.steps import DeckSteps, read_steps
 from fenics_contact.decks.vocabulary import IDLE_PARAMETERS, WITHOUT_EFFECT
 from fenics_contact.readers.deck_bodies import (
@@ -86,6 +87,8 @@ class DeckCards:
     linear: Sequence[LinearCoupling]
     bolts: Sequence[Bolt]
     means: Sequence[Mean]
+    springs: Sequence[NodeSpring]
+    masses: Sequence[NodeMass]
     equations: Sequence[Equation]
     axes: LocalAxes
     interactions: Mapping[str, Interaction]
@@ -123,6 +126,8 @@ class DeckCards:
             linear=read_linear(cards, mesh, orientations),
             bolts=bolts,
             means=means,
+            springs=read_springs(cards, mesh, materials),
+            masses=read_masses(cards, mesh),
             equations=read_equations(cards, mesh),
             axes=read_axes(cards, mesh),
             interactions=interactions,
@@ -146,7 +151,7 @@ class DeckCards:
     def cut_where_loaded(self, steps: DeckSteps) -> DeckCards:
         """Return the cards with sections cut where loads on volumes act on a part of them."""
         weights = [weight for instant in steps.instants for weight in instant.weights]
-        loaded = {w.where[0]: self.mesh.elements_named(w.where[0], w.card, w.row) for w in weights}
+        loaded = {w.where[0]: self.mesh.weighed(w.where[0], w.card, w.row) for w in weights}
         mesh, sections, of_element, parts = split_sections(
             self.mesh, self.sections, self.of_element, self.components, loaded.items()
         )

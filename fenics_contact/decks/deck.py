@@ -20,6 +20,7 @@ from fenics_contact.decks.couplings import drawn
 from fenics_contact.decks.loads import LoadBuilder
 from fenics_contact.decks.names import names_of
 from fenics_contact.decks.pairs import Pairs, pairs_of
+from fenics_contact.decks.spring_ends import springs_of
 from fenics_contact.decks.supports import SupportBuilder
 from fenics_contact.decks.tables import Print, PrintTable
 from fenics_contact.decks.vocabulary import PROCEDURES, refuse_unknown
@@ -294,8 +295,16 @@ def _scene(built: DeckBodies, supports: SupportBuilder, pairs: Pairs) -> Scene:
         except InvalidInputError as error:
             raise of.card.error(str(error)) from error
     held = supports.at(built.steps.at_rest)
-    constraints = supports.constraints()
-    return Scene(built.bodies, held, (), contacts, ties, supports.preloads, constraints=constraints)
+    return Scene(
+        built.bodies,
+        held,
+        (),
+        contacts,
+        ties,
+        supports.preloads,
+        constraints=supports.constraints(),
+        springs=springs_of(built),
+    )
 
 
 def _load_steps(

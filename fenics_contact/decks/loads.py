@@ -24,6 +24,7 @@ from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.couplings import Driven
 from fenics_contact.decks.initial_stress import relieved
 from fenics_contact.decks.names import Forced
+from fenics_contact.decks.springs import name_of
 from fenics_contact.decks.steps import DistributedLoad, Instant
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.readers.deck_bodies import Component, region_names
@@ -52,7 +53,7 @@ class LoadBuilder:
                 bodies = [body for body, mesh in built.meshes.items() if name in mesh.surfaces]
                 found += [Pressure(body, name, value) for body in bodies]
         for weight in instant.weights:
-            found += self._weights(weight)
+            found += [*self._weights(weight), *self._of_masses(weight)]
         for driven, name in built.names.driven:
             if driven.spread:
                 found += self._spread(driven, name, instant)
@@ -95,10 +96,29 @@ class LoadBuilder:
         given = moment if np.any(moment) else None
         return [TotalForce(body, name, tuple(load[:dim]), given, tuple(at.tolist()))] if any(load) else []
 
+    def _of_masses(self, weight: DistributedLoad) -> Iterator[Load]:
+        """Yield the weight, or the centrifugal force, of masses at nodes."""
+        deck, dim = self.built.deck, self.built.deck.dim
+        numbers = np.array(weight.numbers)
+        for each in deck.masses if weight.value else ():
+            if weight.where[0] not in each.sets:
+                continue
+            if weight.where[1] == "GRAV":
+                force = each.mass * weight.value * numbers / np.linalg.norm(numbers)
+            else:
+                arm, along = deck.mesh.points[each.node] - numbers[:3], numbers[3:]
+                arm = arm - (arm @ along) * along / (along @ along)
+                force = each.mass * weight.value * arm
+            name = name_of(deck.mesh.numbers[each.node])
+            body = next((b for b, mesh in self.built.meshes.items() if name in mesh.node_sets), "")
+            if not body:
+                raise each.card.error(f"the mass at {name.lower()} needs a node of an element: give forces")
+            yield PointForce(body, name, tuple((force[:dim] / deck.thickness).tolist()))
+
     def _weights(self, weight: DistributedLoad) -> Iterator[Load]:
         """Yield gravity or centrifugal force on bodies, by region where some are not loaded or differ."""
         deck = self.built.deck
-        elements = deck.mesh.elements_named(weight.where[0], weight.card, weight.row)
+        elements = deck.mesh.weighed(weight.where[0], weight.card, weight.row)
         for part in deck.components if weight.value else ():
             densities: dict[str | None, float] = {}
             names = region_names(deck.sections, part)

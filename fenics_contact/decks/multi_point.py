@@ -77,7 +77,8 @@ def read_means(cards: Sequence[Card], mesh: DeckMesh) -> list[Mean]:
         if card.name != "DISTRIBUTINGCOUPLING":
             continue
         name = card.required("ELSET")
-        if name not in mesh.couplings:
+        means = [link for link in mesh.link_sets.get(name, []) if link.kind == "DCOUP3D"]
+        if not means:
             raise card.error(f"needs ELSET= a set with an element of type DCOUP3D, got {name!r}: add one")
         sums = np.zeros(len(mesh.points))
         for row, entries in enumerate(card.rows):
@@ -85,7 +86,9 @@ def read_means(cards: Sequence[Card], mesh: DeckMesh) -> list[Mean]:
         nodes = np.flatnonzero(sums)
         if not len(nodes) or (sums < 0.0).any():
             raise card.error("needs nodes or sets with weights above zero: add them")
-        found += [Mean(card, int(n), nodes, sums[nodes] / sums.sum()) for n in mesh.couplings[name]]
+        for link in means:
+            node = int(mesh.positions(np.array(link.nodes), "node", link.card, link.row)[0])
+            found.append(Mean(card, node, nodes, sums[nodes] / sums.sum()))
     return found
 
 

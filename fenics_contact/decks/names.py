@@ -13,6 +13,7 @@ from fenics_contact.decks.cards import DeckCards
 from fenics_contact.decks.contact import Sides
 from fenics_contact.decks.couplings import Driven, by_node
 from fenics_contact.decks.multi_point import Equation
+from fenics_contact.decks.springs import name_of
 from fenics_contact.decks.steps import DeckSteps, DistributedLoad, Held
 from fenics_contact.decks.ties import reach_of
 from fenics_contact.readers.deck_cards import Card
@@ -256,12 +257,17 @@ class _Naming:
         return Faces(faces.elements[mine], faces.sides[mine])
 
     def equations(self) -> None:
-        """Name the nodes that an equation holds alone."""
+        """Name the nodes that an equation holds alone, ends of springs, and nodes with masses."""
         for each in self.steps.equations:
             _check_equation(self.deck, self.steps, each)
             if len(set(each.nodes)) == 1:
                 node = each.nodes[0]
-                self.node_sets[f"NODE {self.mesh.numbers[node]}"] = np.array([node])
+                self.node_sets[name_of(self.mesh.numbers[node])] = np.array([node])
+        ends = [node for each in self.deck.springs for node in each.nodes if self.deck.inside[node]]
+        for node in [*ends, *(each.node for each in self.deck.masses)]:
+            self.node_sets[name_of(self.mesh.numbers[node])] = np.array([node])
+        for mean in self.deck.means if self.deck.springs else ():
+            self.node_sets[name_of(self.mesh.numbers[mean.node])] = mean.nodes
 
     def pressed(self) -> dict[tuple[str, ...], str]:
         """Name the faces that pressures act on."""

@@ -535,7 +535,7 @@ def _distributed(card: Card, mesh: DeckMesh, by: int) -> Iterator[DistributedLoa
             where = where[:1]
         elif label in ("GRAV", "CENTRIF"):
             _check_weight(card, row, label, numbers)
-            mesh.elements_named(where[0], card, row)
+            mesh.weighed(where[0], card, row)
         elif label[:1] == "P" and label[1:].isdecimal() and numbers:
             if not where[0].isdecimal():
                 mesh.faces_of(mesh.elements_named(where[0], card, row), label, card, row)

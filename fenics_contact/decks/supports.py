@@ -17,6 +17,7 @@ from fenics_contact._scene.supports import AnySupport, HoldCurrent, RigidSurface
 from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.couplings import Bolt, Driven, rigid_surface
 from fenics_contact.decks.rigid_links import by_small_turns, following, in_their_space, spread_out
+from fenics_contact.decks.springs import name_of
 from fenics_contact.decks.steps import Instant
 from fenics_contact.readers.deck_bodies import Component
 
@@ -120,7 +121,7 @@ class SupportBuilder:
                 np.add.at(normal, list(each.components), each.factors)
                 normal = (normal @ built.deck.axes.of(node))[: built.deck.dim]
                 body = next(b for b in built.meshes if len(built.parts.within(b, np.array([node]))[0]))
-                name = f"NODE {built.deck.mesh.numbers[node]}"
+                name = name_of(built.deck.mesh.numbers[node])
                 found.append(Roller(body, name, 0.0, tuple(normal.tolist())))
         return found
 

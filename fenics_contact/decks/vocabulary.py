@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from fenics_contact.readers.deck_cards import Card, DeckError
 from fenics_contact.readers.deck_elements import element_of
+from fenics_contact.readers.deck_links import is_of_links
 
 #: Cards of a material, behind *MATERIAL.
 MATERIAL_CARDS = {
@@ -20,7 +21,7 @@ MODEL_CARDS = {
     "SOLIDSECTION", "MATERIAL", "ORIENTATION", "DISTRIBUTION", "AMPLITUDE", "INITIALCONDITIONS", "TRANSFORM",
     "CONTACTPAIR", "SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "CLEARANCE", "TIE", "RIGIDBODY",
     "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTINGCOUPLING", "EQUATION", "PRE-TENSIONSECTION",
-    "CYCLICSYMMETRYMODEL", "MPC",
+    "CYCLICSYMMETRYMODEL", "MPC", "SPRING", "MASS",
 }  # fmt: skip
 #: Cards of load steps that are read.
 STEP_CARDS = {
@@ -108,6 +109,8 @@ PARAMETERS: dict[str, set[str]] = {
     "TIE": {"NAME", "ADJUST", "POSITIONTOLERANCE", "CYCLICSYMMETRY"},
     "CYCLICSYMMETRYMODEL": {"N", "NGRAPH", "TIE", "ELSET"},
     "MPC": set(),
+    "SPRING": {"ELSET", "NONLINEAR"},
+    "MASS": {"ELSET"},
     "RIGIDBODY": {"NSET", "ELSET", "REFNODE", "ROTNODE"},
     "COUPLING": {"REFNODE", "SURFACE", "CONSTRAINTNAME", "ORIENTATION"},
     "KINEMATIC": set(),
@@ -133,9 +136,7 @@ STRUCTURES = {
     "MEMBRANESECTION": "membranes are not solved here: mesh the part with solid elements",
     "BEAMSECTION": "beams are not solved here: mesh the part with solid elements",
     "BEAMGENERALSECTION": "beams are not solved here: mesh the part with solid elements",
-    "SPRING": "springs are not read: describe them in Python, by Spring between node sets",
     "DASHPOT": "dashpots are not solved here, where nothing moves in time: leave them out",
-    "MASS": "masses are not read: under GRAV they are forces, give these by *CLOAD",
     "GAP": "gaps between nodes are not read: give a *CONTACT PAIR",
     "USERMATERIAL": "materials of user routines are not read: take one of the guide, or write it in Python",
     "DEPVAR": "it belongs to materials of user routines, which are not read",
@@ -183,7 +184,7 @@ def _of_card(card: Card) -> Iterator[str]:
         yield f"the parameter {strange} is not read: {there} can be"
     if card.name in NOT_YET:
         yield "this card is known, but not read yet: leave it out, or describe it in Python"
-    if card.name == "ELEMENT" and card.name_of("TYPE") not in ("", "DCOUP3D"):
+    if card.name == "ELEMENT" and card.name_of("TYPE") and not is_of_links(card):
         try:
             element_of(card)
         except DeckError as error:

@@ -42,7 +42,8 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
     sections: list[Section] = []
     of_element = np.full(len(mesh.element_numbers), -1)
     for card in cards:
-        if card.name == "SOLIDSECTION" and card.required("ELSET") not in mesh.couplings:
+        name = card.name_of("ELSET")
+        if card.name == "SOLIDSECTION" and (name in mesh.element_sets or name not in mesh.link_sets):
             name = card.required("ELSET")
             of_element[mesh.elements_named(name, card)] = len(sections)
             thick = card.floats(0)[0] if card.lines and card.rows[0][0] else 1.0

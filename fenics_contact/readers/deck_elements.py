@@ -123,8 +123,8 @@ _TYPE = re.compile(r"(C3D|CPS|CPE|CAX)(\d+)([RIHMT]*)")
 
 #: What elements of other programs are, by how their types begin.
 _OTHERS = {
-    "SPRING": ", springs,", "STRI": ", shells,", "SC": ", shells,", "S": ", shells,", "B": ", beams,",
-    "T": ", trusses,", "M3D": ", membranes,", "MASS": ", masses,", "DASHPOT": ", dashpots,", "GAP": ", gaps,",
+    "STRI": ", shells,", "SC": ", shells,", "S": ", shells,", "B": ", beams,",
+    "M3D": ", membranes,", "DASHPOT": ", dashpots,", "GAP": ", gaps,",
     "DC": ", which conduct heat,", "F3D": ", fluids,", "COH": ", cohesive ones,", "R3D": ", rigid ones,",
 }  # fmt: skip
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact.readers.deck_cards import Card, DeckError, plain
 from fenics_contact.readers.deck_elements import Element, element_of, without_repeated
+from fenics_contact.readers.deck_links import Link, is_of_links, read_links, sets_of_links
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ class DeckMesh:
     """What a deck says of its mesh; nodes and elements are known by their positions in it.
 
     `numbers`: numbers of the nodes in the deck, ascending; `origins`: name of a set -> its first card;
-    `couplings`: name of a set of elements DCOUP3D, which are no cells -> positions of their nodes.
+    `links`: elements that are no cells; `link_sets`: name of a set of elements -> such elements of it.
     """
 
     numbers: np.ndarray
@@ -68,7 +69,8 @@ class DeckMesh:
     element_sets: dict[str, np.ndarray] = field(default_factory=dict)
     surfaces: dict[str, Named] = field(default_factory=dict)
     origins: dict[str, Card] = field(default_factory=dict)
-    couplings: dict[str, np.ndarray] = field(default_factory=dict)
+    links: list[Link] = field(default_factory=list)
+    link_sets: dict[str, list[Link]] = field(default_factory=dict)
 
     @property
     def block_of(self) -> np.ndarray:
@@ -94,6 +96,17 @@ class DeckMesh:
         if token.isdecimal():
             return self.positions(np.array([_written(token)]), "element", card, row)
         return card.known("element set", plain(token), self.element_sets, row)
+
+    def weighed(self, token: str, card: Card, row: int | None = None) -> np.ndarray:
+        """Return the positions of the elements that a load on volumes acts on, none of a set of masses."""
+        links = self.link_sets.get(plain(token), [])
+        if any(link.kind.startswith("T") for link in links):
+            raise card.error(f"trusses have no weight here, {plain(token)!r} has some: give forces", row)
+        return (
+            NO_NODES
+            if links and plain(token) not in self.element_sets
+            else self.elements_named(token, card, row)
+        )
 
     def surface_named(self, token: str, card: Card, row: int | None = None) -> Named:
         """Return a surface, which has faces or nodes."""
@@ -181,11 +194,9 @@ def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
     with_nodes = [card for card in cards if card.name == "NODE"]
     numbers, points, numbers_of = _nodes(with_nodes)
     mesh = DeckMesh(numbers, points, [], np.zeros(0, dtype=np.int64))
-    coupling = [card for card in cards if card.name == "ELEMENT" and card.name_of("TYPE") == "DCOUP3D"]
-    for card in coupling:
-        nodes = mesh.positions(card.integers(2)[:, 1], "node", card)
-        mesh.couplings[card.required("ELSET")] = nodes
-    cards = [card for card in cards if card not in coupling]
+    mesh.links += read_links(cards)
+    mesh.link_sets |= sets_of_links(cards, mesh.links)
+    cards = [card for card in cards if not is_of_links(card)]
     _elements(mesh, [card for card in cards if card.name == "ELEMENT"])
     for card, own in zip(with_nodes, numbers_of, strict=True):
         if card.name_of("NSET"):
@@ -240,7 +251,11 @@ def _elements(mesh: DeckMesh, cards: Sequence[Card]) -> None:
             mesh.blocks.append(Block(kind, card, records[mine, 0], own, first, mine))
             first += len(mine)
     if not first:
-        raise DeckError("a deck must have elements, under *ELEMENT; it has none")
+        others = ", ".join(sorted({link.kind for link in mesh.links}))
+        raise DeckError(
+            "a deck must have elements, solid, plane or axisymmetric ones, under *ELEMENT; it has "
+            + (others or "none")
+        )
     mesh.element_numbers = np.concatenate([block.numbers for block in mesh.blocks])
     again = np.flatnonzero(np.diff(np.sort(mesh.element_numbers)) == 0)
     if len(again):
@@ -268,8 +283,17 @@ def _members(mesh: DeckMesh, card: Card, what: str) -> np.ndarray:
             if entry.isdecimal():
                 single.append(_written(entry))
             elif entry:
+                if (
+                    what == "element"
+                    and plain(entry) in mesh.link_sets
+                    and plain(entry) not in mesh.element_sets
+                ):
+                    continue
                 named = mesh.nodes_named if what == "node" else mesh.elements_named
                 found.append(named(entry, card, row))
+    if what == "element":
+        links = {link.number for link in mesh.links}
+        single = [number for number in single if number not in links]
     return np.concatenate([*found, mesh.positions(np.array(single, dtype=np.int64), what, card)])
 
 

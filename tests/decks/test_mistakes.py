@@ -243,7 +243,7 @@ def test_the_command_line_runs_a_deck(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def test_all_that_is_not_known_is_named_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Cards, types of elements and parameters, each once with its line, and what structures are."""
-    more = "*ELEMENT, TYPE=S4\n8, 1, 2, 3, 4\n*SHELL SECTION, ELSET=X\n1.\n*SPRING, ELSET=Y\n"
+    more = "*ELEMENT, TYPE=S4\n8, 1, 2, 3, 4\n*SHELL SECTION, ELSET=X\n1.\n*DASHPOT, ELSET=Y\n"
     more += "*FANCY\n*FANCY\n"
     text = GOOD.replace("*STEP\n", more + "*STEP\n").replace("*CLOAD\n", "*CLOAD, LOAD CASE=2\n")
     path = deck(tmp_path, text)
@@ -254,7 +254,7 @@ def test_all_that_is_not_known_is_named_at_once(tmp_path: Path, capsys: pytest.C
     assert f"line {first}: *ELEMENT: elements of type S4, shells, are not supported" in words
     for card, what in (
         ("*SHELL SECTION, ELSET=X", "shells are not solved here: mesh the part with solid elements"),
-        ("*SPRING, ELSET=Y", "springs are not read"),
+        ("*DASHPOT, ELSET=Y", "dashpots are not solved here"),
         ("*FANCY", "this card is not known: the guide lists those that are"),
         ("*CLOAD, LOAD CASE=2", "the parameter LOADCASE is not read"),
     ):
