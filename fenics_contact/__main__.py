@@ -34,5 +34,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return cli.main(world, arguments)
 
 
+def ccx() -> int:
+    """Run `fenics-contact ccx` with the arguments of the process, as programs start CalculiX."""
+    return main(["ccx", *sys.argv[1:]])
+
+
 if __name__ == "__main__":
     sys.exit(main())

@@ -14,7 +14,7 @@ from typer.core import TyperGroup
 
 from fenics_contact._base.checkpoint import Interrupted
 from fenics_contact._base.progress import visible
-from fenics_contact._cli import accuracy, convert, demos, info, optimize, run, view
+from fenics_contact._cli import accuracy, ccx, convert, demos, info, optimize, run, view
 from fenics_contact._cli.console import (
     EPILOG,
     Console,
@@ -68,7 +68,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (run, optimize, convert, demos, view, accuracy, info):
+for module in (run, optimize, convert, ccx, demos, view, accuracy, info):
     module.add_to(app)
 
 

@@ -40,6 +40,7 @@ from fenics_contact._dolfinx.numbering import (
     match_facets,
     nodal_space_on,
     node_dofs,
+    point_space_on,
     scalar_space,
     update_coordinates,
     vtk_cell_dofs,
@@ -59,6 +60,7 @@ from fenics_contact._dolfinx.templates import (
     displacement_space,
     field_symbols,
     nodal_space,
+    point_space,
     template,
 )
 
@@ -97,6 +99,8 @@ __all__ = [
     "nodal_space",
     "nodal_space_on",
     "node_dofs",
+    "point_space",
+    "point_space_on",
     "rank_mesh",
     "read_mesh",
     "read_tags",

@@ -11,7 +11,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._dolfinx.cache import compiled_once
 from fenics_contact._dolfinx.cells import NODE_ORDER, cell_type_named, facet_vertices
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone, version
-from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
+from fenics_contact._dolfinx.templates import cellwise_element, point_element, scalar_element, vector_element
 
 #: Elements that this process has compiled, each with its dofmap and the library that holds both: dolfinx 0.5
 #: looks them up in the folder of compiled forms for every space, of which each subdomain has several.
@@ -62,6 +62,11 @@ def scalar_space(mesh: dolfinx.mesh.Mesh, degree: int) -> dolfinx.fem.FunctionSp
 def cellwise_space_on(mesh: dolfinx.mesh.Mesh, shape: tuple[int, ...]) -> dolfinx.fem.FunctionSpace:
     """Return the space of scalars, or vectors, on ``mesh`` that are constant on each cell."""
     return _space(mesh, cellwise_element(cell_type_of_mesh(mesh), shape))
+
+
+def point_space_on(mesh: dolfinx.mesh.Mesh, degree: int) -> dolfinx.fem.FunctionSpace:
+    """Return the space of scalars on ``mesh`` at the points of the quadrature of a degree."""
+    return _space(mesh, point_element(cell_type_of_mesh(mesh), degree))
 
 
 def nodal_space_on(mesh: dolfinx.mesh.Mesh, size: int) -> dolfinx.fem.FunctionSpace:

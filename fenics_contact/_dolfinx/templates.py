@@ -50,6 +50,17 @@ def cellwise_element(cell_type: str, shape: tuple[int, ...] = ()) -> ufl.finitee
     return ufl.TensorElement("DG", cell, 0, shape=shape)
 
 
+@cache
+def point_element(cell_type: str, degree: int) -> ufl.finiteelement.AbstractFiniteElement:
+    """Return the element of scalars at the points of the quadrature of a degree."""
+    if not old():
+        import basix.ufl
+
+        return basix.ufl.quadrature_element(shape_of(cell_type), degree=degree)
+    cell = ufl.Cell(shape_of(cell_type))
+    return ufl.FiniteElement("Quadrature", cell, degree, quad_scheme="default")
+
+
 @lru_cache(maxsize=16)
 def template(cell_type: str) -> ufl.Mesh:
     """Return the mesh without coordinates on which forms for cells of this type are written."""
@@ -91,3 +102,9 @@ def nodal_space(cell_type: str) -> ufl.FunctionSpace:
 def cellwise_space(cell_type: str, shape: tuple[int, ...] = ()) -> ufl.FunctionSpace:
     """Return the template's space of scalars, or vectors, that are constant on each cell."""
     return ufl.FunctionSpace(template(cell_type), cellwise_element(cell_type, shape))
+
+
+@lru_cache(maxsize=16)
+def point_space(cell_type: str, degree: int) -> ufl.FunctionSpace:
+    """Return the template's space of scalars at the points of the quadrature of a degree."""
+    return ufl.FunctionSpace(template(cell_type), point_element(cell_type, degree))

@@ -7,9 +7,20 @@ from fenics_contact._base.late_names import late_names
 if TYPE_CHECKING:
     from fenics_contact.decks.convert import write_scene_file
     from fenics_contact.decks.deck import Deck, read_deck
+    from fenics_contact.decks.job import Increment, run_job
     from fenics_contact.decks.tables import Print, PrintTable
     from fenics_contact.readers.deck_cards import DeckError, Origin
 
-__all__ = ["Deck", "DeckError", "Origin", "Print", "PrintTable", "read_deck", "write_scene_file"]
+__all__ = [
+    "Deck",
+    "DeckError",
+    "Increment",
+    "Origin",
+    "Print",
+    "PrintTable",
+    "read_deck",
+    "run_job",
+    "write_scene_file",
+]
 
 __getattr__, __dir__ = late_names(__name__)

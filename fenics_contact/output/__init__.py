@@ -10,6 +10,7 @@ from fenics_contact._base.late_names import late_names
 if TYPE_CHECKING:
     from fenics_contact.output.cad import CadError, write_step
     from fenics_contact.output.files import OutputError, only_run_in, write_json, write_text
+    from fenics_contact.output.frd import write_frd
     from fenics_contact.output.paraview import ResultSeries, write_xdmf
     from fenics_contact.output.result import read_result, versions, write_optimisation_result
     from fenics_contact.output.surfaces import write_design_table, write_stl
@@ -25,6 +26,7 @@ __all__ = [
     "versions",
     "write_contact_table",
     "write_design_table",
+    "write_frd",
     "write_json",
     "write_optimisation_result",
     "write_step",

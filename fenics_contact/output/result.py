@@ -203,11 +203,16 @@ def versions() -> dict[str, str]:
 
     A library that is not installed or does not report its version is marked as such.
     """
-    entries = {"fenics_contact": _installed("fenics_contact"), "python": platform.python_version()}
+    entries = {"fenics_contact": own_version(), "python": platform.python_version()}
     entries["dolfinx"] = _dolfinx.release()
     entries["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
     entries["mpi"] = " ".join(re.split(r"[,\n\x00]", MPI.Get_library_version().strip())[0].split())
     return entries | {name: _installed(name) for name in _MODULES}
+
+
+def own_version() -> str:
+    """Return the version of this package."""
+    return _installed("fenics_contact")
 
 
 def _installed(name: str) -> str:

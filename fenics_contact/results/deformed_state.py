@@ -22,7 +22,7 @@ from fenics_contact.results.state import State, comm_of
 if TYPE_CHECKING:
     import dolfinx
 
-    from fenics_contact._fem.mechanics import History
+    from fenics_contact._fem.mechanics import History, Response
     from fenics_contact._large_deformations.load_steps import Snap
     from fenics_contact._large_deformations.loading import Loading
     from fenics_contact._large_deformations.moving_contact import ContactConfiguration
@@ -105,6 +105,11 @@ class DeformedState(State):
         pairs = zip(decomposition.meshes, found, strict=True)
         parts = [(mesh.body, mesh.cells, values) for mesh, values in pairs if values is not None]
         return History.unloaded(self.scene).advanced(decomposition.comm, parts)
+
+    @property
+    def responses(self) -> tuple[Response, ...]:
+        """What the materials of each subdomain of this rank answer."""
+        return self.equilibrium.evaluation.responses
 
     @cached_property
     def stress(self) -> dict[str, dolfinx.fem.Function]:  # type: ignore[override]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -133,10 +133,10 @@ class CellMeans:
         """Compile the forms. Collective on ``comm``."""
         element = body.element
         self._parts = _composition(mesh, body)
-        q = ufl.TestFunction(element.cellwise())
+        q = ufl.TestFunction(self._tests(element))
         with together(comm):
             form, constants, coefficients = _weighted(
-                self._parts.materials, element, q, temperature, quantity
+                self._parts.materials, element, q, temperature, quantity, self._measure(element)
             )
             stress = None
             if temperature.initial:
@@ -145,9 +145,21 @@ class CellMeans:
             self._fields = temperature.fields(mesh, body.mesh.at_nodes_apart(body.mesh.points), stress)
         self._form = Template(mesh.comm, form, constants, coefficients)
         self._numbers = temperature.numbers
-        self._space = _dolfinx.scalar_space(mesh, 0)
-        volume = Template(mesh.comm, element.integrand(q) * volume_measure(element, 2), ())
+        self._space = self._space_on(mesh, element)
+        volume = Template(mesh.comm, element.integrand(q) * self._measure(element), ())
         self._volume = _dolfinx.assemble_vector(volume.bind([self._space], ()))
+
+    def _measure(self, element: Element) -> ufl.Measure:
+        """Return dx on the template."""
+        return volume_measure(element, 2)
+
+    def _tests(self, element: Element) -> ufl.FunctionSpace:
+        """Return the template's space of functions by which is weighted."""
+        return element.cellwise()
+
+    def _space_on(self, mesh: _dolfinx.mesh.Mesh, element: Element) -> _dolfinx.fem.FunctionSpace:
+        """Return the space of these on a mesh."""
+        return _dolfinx.scalar_space(mesh, 0)
 
     def of(self, displacement: _dolfinx.fem.Function, values: tuple[float, ...] = ()) -> np.ndarray:
         """Return the means on this rank's cells, shape (n_owned,). Collective."""
@@ -241,6 +253,7 @@ def _weighted(
     q: Expr,
     temperature: Temperature,
     quantity: tuple[OfStress, int],
+    dx: ufl.Measure,
 ) -> Written:
     """Return ∫ of a quantity times q dx (a form), its constants and its coefficients."""
     (u,) = element.fields(1)
@@ -252,7 +265,7 @@ def _weighted(
     def density(material: Material, constants: tuple[ufl.Constant, ...]) -> Expr:
         return of_stress(stress_in_space(material, displacement, constants, change), weights) * q
 
-    form, constants = integrate(materials, element, density, volume_measure(element, 2))
+    form, constants = integrate(materials, element, density, dx)
     return form, (*weights, *numbers, *constants), [u, *fields]
 
 
@@ -285,6 +298,56 @@ class GatheredFields:
     cells: dict[str, np.ndarray]
 
 
+@dataclass(frozen=True, eq=False)
+class ContactNodes:
+    """The nodes of one body at which contact points are."""
+
+    contact: ContactResult
+    scene: Scene
+    numbers: NodeNumbers
+    body: str
+
+    @cached_property
+    def _span(self) -> tuple[int, int]:
+        start, end = self.numbers.node_offset[self.numbers.body_names.index(self.body) :][:2]
+        return int(start), int(end - start)
+
+    @cached_property
+    def nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the numbers of the contact points on the body, and of their nodes in it."""
+        start, count = self._span
+        nodes = self.contact.points.slave - start
+        mine = np.flatnonzero((nodes >= 0) & (nodes < count))
+        return mine, nodes[mine]
+
+    def summed(self, values: np.ndarray, filled: bool = False) -> np.ndarray:
+        """Return values of contact points at all nodes of the body, zero at others.
+
+        `filled`: whether corners of quadratic facets without a point of their own are interpolated.
+        """
+        (start, count), (mine, _) = self._span, self.nodes
+        points, mesh = self.contact.points, self.scene.bodies[self.body].mesh
+        total = np.zeros((count, *values.shape[1:]))
+        for pair in np.unique(points.pair[mine]):
+            field, own = np.zeros_like(total), mine[points.pair[mine] == pair]
+            nodes = points.slave[own] - start
+            if filled and field.ndim == 1:
+                every, given = points.of_surface(pair, values)
+                alone = ~np.isin(every, points.slave)
+                field[every[alone] - start] = given[alone]
+            field[nodes] = values[own]
+            facets = mesh.surfaces[self.scene.contacts[pair].slave.name]
+            if filled and mesh.hanging:
+                field = mesh.hanging.filled_in(field, facets, nodes)
+            filled_in = filled and not self.scene.contacts[pair].by_mortar
+            field = filled_at_corners(facets, field) if filled_in else field
+            if filled_in and field.ndim == 1:  # slip is zero on an axis
+                measure = self.scene.kinematics.measure
+                field = measure.filled(facets, field, self.scene.bodies[self.body].on_axis)
+            total += field
+        return total
+
+
 def contact_fields(
     contact: ContactResult, scene: Scene, numbers: NodeNumbers, body: str
 ) -> dict[str, np.ndarray]:
@@ -297,41 +360,18 @@ def contact_fields(
     axis of revolution. A node that belongs to several pairs has their sum, and the status of the last; one
     whose force is that of a point elsewhere, as on one of both sides of a sector, has the pressure there.
     """
-    start, end = numbers.node_offset[numbers.body_names.index(body) :][:2]
-    count = int(end - start)
-    nodes = contact.points.slave - start
-    mine = np.flatnonzero((nodes >= 0) & (nodes < count))
-
-    def summed(values: np.ndarray, filled: bool = False) -> np.ndarray:
-        total = np.zeros((count, *values.shape[1:]))
-        for pair in np.unique(contact.points.pair[mine]):
-            field, own = np.zeros_like(total), mine[contact.points.pair[mine] == pair]
-            if filled and field.ndim == 1:
-                every, given = contact.points.of_surface(pair, values)
-                alone = ~np.isin(every, contact.points.slave)
-                field[every[alone] - start] = given[alone]
-            field[nodes[own]] = values[own]
-            mesh = scene.bodies[body].mesh
-            facets = mesh.surfaces[scene.contacts[pair].slave.name]
-            if filled and mesh.hanging:
-                field = mesh.hanging.filled_in(field, facets, nodes[own])
-            filled_in = filled and not scene.contacts[pair].by_mortar
-            field = filled_at_corners(facets, field) if filled_in else field
-            if filled_in and field.ndim == 1:  # slip is zero on an axis
-                field = scene.kinematics.measure.filled(facets, field, scene.bodies[body].on_axis)
-            total += field
-        return total
-
-    status = np.full(count, -1, dtype=np.int32)
-    status[nodes[mine]] = contact.status[mine]
+    at = ContactNodes(contact, scene, numbers, body)
+    mine, nodes = at.nodes
+    status = np.full(scene.bodies[body].mesh.n_nodes, -1, dtype=np.int32)
+    status[nodes] = contact.status[mine]
     pressures = {"contact_pressure": contact.pressure}
     if scene.deforms_much:
         pressures["contact_nominal_pressure"] = contact.nominal_pressure
     return {
         "contact_status": status,
-        **{name: np.maximum(summed(values, filled=True), 0.0) for name, values in pressures.items()},
-        "contact_force": summed(contact.force),
-        "contact_slip": summed(contact.slip_in_space, filled=True),
+        **{name: np.maximum(at.summed(each, filled=True), 0.0) for name, each in pressures.items()},
+        "contact_force": at.summed(contact.force),
+        "contact_slip": at.summed(contact.slip_in_space, filled=True),
     }
 
 

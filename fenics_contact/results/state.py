@@ -19,7 +19,7 @@ from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError, collectively
-from fenics_contact.feti.averages import nodal_mean
+from fenics_contact.feti.averages import nodal_mean, nodal_sum
 from fenics_contact.feti.direct import DirectSolution
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.solution import Solution
@@ -62,7 +62,9 @@ if TYPE_CHECKING:
     import pyvista
 
     from fenics_contact._accuracy.state_errors import BalancedTolerance, StateErrors
+    from fenics_contact._fem.mechanics import Response
     from fenics_contact.feti.dual import DualSystem
+    from fenics_contact.results.at_points import PointFields
 
 
 @dataclass(frozen=True)
@@ -418,6 +420,26 @@ class State(ABC):
         on_cells = self.stress if self.scene.is_nonlinear else {}
         return nodal_stress(self.torn, self._nodal_displacement, meshes, on_cells)
 
+    @collectively("State.gather_at_points", comm_of)
+    def gather_at_points(self, body: str) -> PointFields:
+        """Return stress and strain at the points of the quadrature of a body's cells, on every rank.
+
+        Collective. Gauss points, two or three in each direction; one point, three or four in triangles and
+        tetrahedra.
+
+        Example:
+            >>> state.gather_at_points("block").stress.shape  # cells, points, 3, 3  # doctest: +SKIP
+        """
+        from fenics_contact.results.at_points import point_fields
+
+        moved = self.gather_displacement(body)
+        return point_fields(self.torn, body, self.displacement[body], moved, self.responses)
+
+    @property
+    def responses(self) -> tuple[Response, ...]:
+        """What the materials of each subdomain of this rank answer, none where all are linear."""
+        return ()
+
     @collectively("State.gather_fields", comm_of)
     def gather_fields(self, body: str) -> GatheredFields:
         """Return all fields of a body on every rank. Collective."""
@@ -465,6 +487,30 @@ class State(ABC):
         numbers = NodeNumbers.of(self.scene)
         first = numbers.first_of(body)
         return self._nodal_forces.reaction[first : first + self.scene.bodies[body].mesh.n_nodes]
+
+    @collectively("State.gather_internal_forces", comm_of)
+    def gather_internal_forces(self, body: str) -> np.ndarray:
+        """Return the force that holds each node of a body against its stress, on every rank. Collective.
+
+        That of loads, supports and joints such as ties, not that of contact: CalculiX's RF.
+
+        Returns:
+            Shape (n_nodes, dim), [force].
+        """
+        first = NodeNumbers.of(self.scene).first_of(body)
+        return self._internal_forces[first : first + self.scene.bodies[body].mesh.n_nodes]
+
+    @cached_property
+    def _internal_forces(self) -> np.ndarray:
+        from fenics_contact.results.at_points import internal_forces, stress_at_rest
+
+        torn, forces = self.torn, self._nodal_forces
+        rows = nodal_sum(torn.decomposition, torn.force(self.solution.multiplier))
+        at_rest = [
+            internal_forces(each, stress_at_rest(torn, name, self.displacement[name].function_space.mesh))
+            for name, each in self.scene.bodies.items()
+        ]
+        return forces.load - rows - torn.points.on_nodes(forces.contact) + np.concatenate(at_rest)
 
     @collectively("State.foundations", comm_of)
     def foundations(self, about: GivenVector | np.ndarray | None = None) -> Resultants:

@@ -1,0 +1,290 @@
+"""What a deck asks for of its results, in the files that CalculiX writes: ``.frd`` and ``.dat``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from fenics_contact.decks.deck import Deck
+from fenics_contact.decks.tables import Print
+from fenics_contact.output.frd import (
+    BodyNumbers,
+    FrdCells,
+    FrdField,
+    FrdMesh,
+    contact_values,
+    formatted,
+    nodal_fields,
+)
+from fenics_contact.readers.deck_elements import Element
+from fenics_contact.readers.deck_mesh import Block
+from fenics_contact.results.at_points import PointFields
+from fenics_contact.results.fields import ContactNodes, in_space
+from fenics_contact.results.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class DeckResults:
+    """The results of a deck by its own numbers, by what it asks for.
+
+    What a card asks for holds in later steps, too, until another card of its kind.
+    """
+
+    deck: Deck
+
+    #: Kinds of fields by card and variable.
+    kinds: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "NODEFILE": {"U": "DISP", "RF": "FORC"},
+        "ELFILE": {"S": "STRESS", "E": "TOSTRAIN"},
+        "CONTACTFILE": {"CDIS": "CONTACT", "CSTR": "CONTACT"},
+    }
+    #: Variables that are printed, by card.
+    printed: ClassVar[Mapping[str, Sequence[str]]] = {
+        "NODEPRINT": ("U", "RF"),
+        "ELPRINT": ("S", "E"),
+        "CONTACTPRINT": ("CDIS", "CSTR", "CF", "CFN", "CFS"),
+    }
+
+    @cached_property
+    def numbering(self) -> BodyNumbers:
+        """Numbers of nodes and cells, and the mesh: that of the deck."""
+        mesh = self.deck.mesh.mesh
+        used = np.unique(np.concatenate([block.nodes.ravel() for block in mesh.blocks]))
+        cells = [
+            FrdCells(each.element.dim, each.numbers, mesh.numbers[each.nodes[:, each.element.written]])
+            for each in mesh.blocks
+        ]
+        known = FrdMesh(mesh.numbers[used], mesh.points[used], cells)
+        return BodyNumbers(self.deck.node_numbers, known, self.deck.thickness)
+
+    def asked(self, step: int, card: str) -> list[Print]:
+        """Return what cards of a kind ask for in a step: those of the last step that has some."""
+        steps = [each.step for each in self.deck.prints if _plain(each) == card and each.step <= step]
+        return [each for each in self.deck.prints if _plain(each) == card and each.step in steps[-1:]]
+
+    def fields(self, step: int) -> list[str]:
+        """Return the kinds of fields of a step; displacements and stresses if the deck asks for none."""
+        found = [
+            kind
+            for card, kinds in self.kinds.items()
+            for each in self.asked(step, card)
+            for variable, kind in kinds.items()
+            if variable in each.variables
+        ]
+        anything = any(_plain(each) in self.kinds for each in self.deck.prints)
+        return found if anything else ["DISP", "STRESS"]
+
+    @property
+    def notes(self) -> list[str]:
+        """What is asked for and not written, in words."""
+        known = {card: set(kinds) for card, kinds in (*self.kinds.items(), *self.printed.items())}
+        found = [
+            f"*{each.card}, {each.origin.file} line {each.origin.line}: {', '.join(rest)} not written"
+            for each in self.deck.prints
+            if (rest := [name for name in each.variables if name not in known[_plain(each)]])
+        ]
+        asks = any(_plain(each) in self.kinds for each in self.deck.prints)
+        nothing = "the deck asks for no fields (*NODE FILE, *EL FILE): displacements and stresses are written"
+        return found if asks else [*found, nothing]
+
+    def nodal(self, state: State, step: int) -> list[FrdField]:
+        """Return the fields of a state in a step, those of sets for their nodes alone. Collective."""
+        found = nodal_fields(state, self.numbering, self.fields(step))
+        chosen = {
+            kind: np.concatenate([self.deck.node_sets[each.where] for each in some])
+            for card, kinds in self.kinds.items()
+            for kind in kinds.values()
+            if (some := self.asked(step, card)) and all(each.where in self.deck.node_sets for each in some)
+        }
+        return [_part(each, chosen[each.kind]) if each.kind in chosen else each for each in found]
+
+    def printout(self, state: State, step: int, time: float) -> str:
+        """Return the tables of the printed file of a state. Collective."""
+        tables = Tables(self, state, time)
+        return "".join(
+            text
+            for card in self.printed
+            for each in self.asked(step, card)
+            for variable in each.variables
+            if variable in self.printed[card]
+            for text in tables.of(each, variable)
+        )
+
+
+def _plain(asked: Print) -> str:
+    return asked.card.replace(" ", "").upper()
+
+
+def _part(of: FrdField, nodes: np.ndarray) -> FrdField:
+    mine = np.isin(of.numbers, nodes)
+    return FrdField(of.kind, of.numbers[mine], of.values[mine])
+
+
+def exponential(value: float, digits: int) -> str:
+    """Return a number as Fortran writes it, from 0.1 to 1 and an exponent: 0.5000000E+00."""
+    mantissa, exponent = f"{value:.{digits - 1}E}".split("E")
+    sign = "-" if mantissa.startswith("-") else ""
+    return f"{sign}0.{mantissa.lstrip('-').replace('.', '')}E{int(exponent) + (value != 0.0):+03d}"
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """The tables of a state as CalculiX prints them.
+
+    Forces of bodies of revolution are those of its sector of two degrees, as there. Of plane bodies stresses
+    are repeated for its points across the thickness.
+    """
+
+    results: DeckResults
+    state: State
+    time: float
+
+    #: Degrees of CalculiX's sector of bodies of revolution.
+    sector: ClassVar[float] = 2.0
+
+    def of(self, asked: Print, variable: str) -> Iterator[str]:
+        """Yield the tables of a variable."""
+        made: dict[str, Callable[[Print], Iterator[str]]] = {
+            "U": self._displacements, "RF": self._forces, "S": self._stresses, "E": self._strains,
+            "CDIS": self._distances, "CSTR": self._tractions,
+        }  # fmt: skip
+        yield from made.get(variable, self._resultants)(asked)
+
+    def _head(self, what: str) -> str:
+        return f"\n {what} and time {exponential(self.time, 7):>14s}\n\n"
+
+    def _displacements(self, asked: Print) -> Iterator[str]:
+        numbers, values = self._nodal("DISP", asked)
+        yield self._head(f"displacements (vx,vy,vz) for set {asked.where}") + _rows(numbers, values)
+
+    def _forces(self, asked: Print) -> Iterator[str]:
+        numbers, values = self._nodal("FORC", asked)
+        if self.state.scene.axisymmetric:
+            values = values * self.sector / 360.0
+        if asked.totals != "ONLY":
+            yield self._head(f"forces (fx,fy,fz) for set {asked.where}") + _rows(numbers, values)
+        if asked.totals:
+            yield self._head(f"total force (fx,fy,fz) for set {asked.where}") + _sums(values.sum(axis=0))
+
+    def _nodal(self, kind: str, asked: Print) -> tuple[np.ndarray, np.ndarray]:
+        (field,) = nodal_fields(self.state, self.results.numbering, (kind,))
+        mine = np.isin(field.numbers, self.results.deck.node_sets.get(asked.where, field.numbers))
+        return field.numbers[mine], field.values[mine]
+
+    def _stresses(self, asked: Print) -> Iterator[str]:
+        head = f"stresses (elem, integ.pnt.,sxx,syy,szz,sxy,sxz,syz) for set {asked.where}"
+        yield self._head(head) + self._at_points(asked, "stress")
+
+    def _strains(self, asked: Print) -> Iterator[str]:
+        head = f"strains (elem, integ.pnt.,exx,eyy,ezz,exy,exz,eyz) for set {asked.where}"
+        yield self._head(head) + self._at_points(asked, "strain")
+
+    def _at_points(self, asked: Print, what: str) -> str:
+        deck, found = self.results.deck, [np.zeros((0, 8))]
+        mesh = deck.mesh.mesh
+        for body, numbers in deck.element_numbers.items():
+            at = self.state.gather_at_points(body)
+            for block in mesh.blocks:
+                mine = np.isin(numbers, block.numbers) & np.isin(numbers, deck.element_sets[asked.where])
+                if mine.any():
+                    found.append(_point_rows(block, at, numbers[mine], getattr(at, what)[mine]))
+        rows = np.concatenate(found)
+        row = "%10d %3d" + " %13.6E" * 6 + "\n"
+        return formatted(row, rows[np.argsort(rows[:, 0], kind="stable")])
+
+    def _distances(self, asked: Print) -> Iterator[str]:
+        head = "relative contact displacement (slave node,normal,tang1,tang2) for all contact elements"
+        yield self._head(head).replace("time  ", "time ") + self._contact([0, 1, 2])
+
+    def _tractions(self, asked: Print) -> Iterator[str]:
+        head = "contact stress (slave node,press,tang1,tang2) for all contact elements"
+        yield self._head(head).replace("time  ", "time ") + self._contact([3, 4, 5])
+
+    def _contact(self, columns: list[int]) -> str:
+        numbers, values = [np.zeros(0)], [np.zeros((0, 3))]
+        tearing = self.state.torn.decomposition.tearing
+        for body, nodes in self.results.deck.node_numbers.items():
+            at = np.unique(ContactNodes(self.state.contact, self.state.scene, tearing, body).nodes[1])
+            at = at[nodes[at] > 0]
+            numbers.append(nodes[at])
+            values.append(contact_values(self.state, body)[at][:, columns])
+        order = np.argsort(np.concatenate(numbers), kind="stable")
+        return _rows(np.concatenate(numbers)[order], np.concatenate(values)[order])
+
+    def _resultants(self, asked: Print) -> Iterator[str]:
+        contact, scene = self.state.contact, self.state.scene
+        thickness = self.results.deck.thickness
+        for number, pair in enumerate(scene.contacts):
+            mine = contact.on_pair(number)
+            area = contact.area[mine] * thickness
+            force = in_space(contact.force[mine] * thickness)
+            places, normal = in_space(self.state.contact_places[mine]), -in_space(contact.points.normal[mine])
+            centre, total = area @ places / area.sum(), force.sum(axis=0)
+            mean = area @ normal / area.sum()
+            pressing = -float((contact.normal_force[mine] * thickness).sum())
+            shear = float(np.linalg.norm(total - (total @ mean) * mean))
+            blocks = {
+                "total surface force (fx,fy,fz) and moment about the origin (mx,my,mz)": [
+                    *total, *np.cross(places, force).sum(axis=0),
+                ],
+                "center of gravity and mean normal": [*centre, *mean],
+                "moment about the center of gravity(mx,my,mz)": np.cross(places - centre, force).sum(axis=0),
+                "area,  normal force (+ = tension) and shear force (size)": [area.sum(), pressing, shear],
+            }  # fmt: skip
+            head = f"statistics for slave set {pair.slave.name}, master set {pair.master_surface.name}"
+            text = "".join(f"   {words}\n\n  {_sums(values)[6:]}\n" for words, values in blocks.items())
+            yield "\n" + self._head(head) + text
+
+
+def _rows(numbers: np.ndarray, values: np.ndarray) -> str:
+    """Return lines of numbers of nodes and three values."""
+    return formatted("%10d" + " %13.6E" * values.shape[1] + "\n", np.column_stack([numbers, values + 0.0]))
+
+
+def _sums(values: Sequence[float] | np.ndarray) -> str:
+    return " " * 6 + "".join(f" {value:13.6E}" for value in values) + "\n"
+
+
+def _point_rows(block: Block, at: PointFields, numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return number, point and components of elements at CalculiX's points."""
+    places, layers = points_of(block.element, at.collapses)
+    own = np.einsum("mq,cqij->cmij", at.to(places), values)
+    own = np.tile(own, (1, layers, 1, 1))
+    points = np.tile(np.arange(1, own.shape[1] + 1), len(own))
+    parts = [own[..., i, j].ravel() for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return np.column_stack([np.repeat(numbers, own.shape[1]), points, *parts])
+
+
+def points_of(element: Element, collapses: bool) -> tuple[np.ndarray, int]:
+    """Return positions of the points of an element in its cell, in CalculiX's order, and layers of them.
+
+    `collapses`: whether triangles, prisms and tetrahedra are cells whose vertices coincide.
+    """
+    count, dim = len(element.written), element.dim
+    linear = count <= 8 if dim == 3 else count <= 4
+    gauss = 0.5 + 0.5 * np.polynomial.legendre.leggauss(2 if linear or element.variant == "R" else 3)[0]
+    if count in {3: (8, 20), 2: (4, 8)}[dim]:
+        grid = np.meshgrid(*[gauss] * dim, indexing="ij")
+        return np.stack([each.ravel() for each in grid[::-1]], axis=1), len(gauss)
+    if (dim, count) in ((3, 4), (3, 10)):
+        near, far = (0.25, 0.25) if count == 4 else (0.58541019662496852, 0.13819660112501051)
+        simplex = np.full((4, 3), far) + np.vstack([np.zeros(3), np.eye(3)]) * (near - far)
+        return _collapsed(simplex[: 1 if count == 4 else 4], collapses), 1
+    flat = np.array([[1 / 3, 1 / 3]]) if linear else np.eye(3, 2, -1) / 2 + 1 / 6
+    if dim == 2:
+        return _collapsed(flat, collapses), 3 - linear
+    heights = np.repeat(gauss, len(flat))[:, None]
+    return np.hstack([np.tile(_collapsed(flat, True), (len(gauss), 1)), heights]), 1
+
+
+def _collapsed(places: np.ndarray, collapses: bool) -> np.ndarray:
+    """Return positions in a triangle or tetrahedron as those in the collapsed cell."""
+    if not collapses:
+        return places
+    rest = 1.0 - places[:, -1:]
+    inner = places[:, :-1] / rest
+    return np.hstack([inner if inner.shape[1] == 1 else _collapsed(inner, True), places[:, -1:]])

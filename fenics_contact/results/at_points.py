@@ -1,0 +1,237 @@
+"""Stresses and strains at the points of the quadrature of cells, and at nodes extrapolated from there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import comb
+from typing import TYPE_CHECKING
+
+import numpy as np
+import ufl
+
+from fenics_contact import _dolfinx
+from fenics_contact._base.display import displayed
+from fenics_contact._fem.forms import temperature_of
+from fenics_contact._fem.templates import quadrature_degree, volume_measure
+from fenics_contact._kinematics.base import Gradients
+from fenics_contact._kinematics.element import Element
+from fenics_contact._scene.body import Body
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.materials.elastic import isotropic_constants
+from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlinear
+from fenics_contact.mesh.cell_types import CellType, quadrature, shape_gradients, shape_values
+from fenics_contact.mesh.collapsed import as_hexahedra, places_of
+from fenics_contact.mesh.quality import determinants
+from fenics_contact.results.fields import CellStress, cells_of_body, tensors
+
+if TYPE_CHECKING:
+    from fenics_contact._fem.mechanics import Response
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class PointFields:
+    """Stress and strain of one body at the points of the quadrature of its cells, replicated on all ranks.
+
+    Attributes:
+        positions: Of the points in the reference cell, [0, 1] in each direction, shape (n_points, dim). Cells
+            of other shapes are hexahedra some of whose vertices coincide.
+        stress: Shape (n_cells, n_points, 3, 3), [force / length²], Cauchy's where bodies deform much.
+        strain: Shape (n_cells, n_points, 3, 3): ½ (∇u + ∇uᵀ), where bodies deform much ½ (FᵀF − 1). Normal to
+            plane bodies it is zero, in plane stress with isotropic materials −ν/E (σ₁₁ + σ₂₂), without what
+            heat adds.
+    """
+
+    positions: np.ndarray
+    stress: np.ndarray
+    strain: np.ndarray
+    _cell: CellType
+
+    @property
+    def collapses(self) -> bool:
+        """Whether triangles, prisms and tetrahedra are cells whose vertices coincide."""
+        return not self._cell.is_simplex
+
+    def to(self, places: np.ndarray) -> np.ndarray:
+        """Return the matrix, (m, n_points), that makes values at other positions of those at the points.
+
+        It is that of the polynomials that the points determine: of degree 1 or 2 in each direction, in
+        triangles and tetrahedra of degree 0 or 1.
+        """
+        count = len(self.positions)
+        return _monomials(self._cell, count, places) @ np.linalg.pinv(
+            _monomials(self._cell, count, self.positions)
+        )
+
+    def at_nodes(self, values: np.ndarray, cells: np.ndarray, n_nodes: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return values at nodes: those of each cell extrapolated to its nodes, then the mean over cells.
+
+        As CalculiX does: 8 Gauss points by the trilinear function that they determine, 27 by the triquadratic
+        one, 4 points of tetrahedra by the linear one; means over all materials.
+
+        Args:
+            values: At the points, shape (n_cells, n_points, ...).
+            cells: Nodes of the cells, shape (n_cells, nodes of a cell).
+            n_nodes: Number of nodes.
+
+        Returns:
+            Sums over cells, and numbers of cells, shapes (n_nodes, ...) and (n_nodes,).
+        """
+        own = np.tensordot(values, self.to(self._cell.nodes), axes=(1, 1))  # (n_cells, ..., nodes)
+        flat = np.moveaxis(own, -1, 1).reshape(cells.size, -1)
+        total = [np.bincount(cells.ravel(), column, minlength=n_nodes) for column in flat.T]
+        count = np.bincount(cells.ravel(), minlength=n_nodes).astype(np.float64)
+        return np.stack(total, axis=1).reshape(n_nodes, *values.shape[2:]), count
+
+
+def _monomials(cell: CellType, count: int, places: np.ndarray) -> np.ndarray:
+    """Return the monomials, (m, k), that as many points of a quadrature determine."""
+    if cell.is_simplex:
+        degree = max(d for d in range(6) if comb(d + cell.dim, cell.dim) <= count)
+        powers = [each for each in product(range(degree + 1), repeat=cell.dim) if sum(each) <= degree]
+    else:
+        powers = list(product(range(round(count ** (1.0 / cell.dim))), repeat=cell.dim))
+    return np.stack([np.prod(places**power, axis=1) for power in np.array(powers)], axis=1)
+
+
+class PointStress(CellStress):
+    """The stress at the points of the quadrature of the cells of one body.
+
+    Functions that are one at a point and zero at all others have the weighted stress there as integral.
+    """
+
+    def _measure(self, element: Element) -> ufl.Measure:
+        return volume_measure(element)
+
+    def _tests(self, element: Element) -> ufl.FunctionSpace:
+        return _dolfinx.point_space(element.cells, quadrature_degree(element))
+
+    def _space_on(self, mesh: _dolfinx.mesh.Mesh, element: Element) -> _dolfinx.fem.FunctionSpace:
+        return _dolfinx.point_space_on(mesh, quadrature_degree(element))
+
+
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """The points of the quadrature of the cells of a body, and the displacements of its nodes."""
+
+    body: Body
+    displacement: np.ndarray
+
+    @cached_property
+    def positions(self) -> np.ndarray:
+        """Positions of the points in the reference cell."""
+        return quadrature(self.body.element.cell, quadrature_degree(self.body.element))[0]
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """Volumes that belong to the points, (n_cells, n_points)."""
+        mesh, cell = self.body.mesh, self.body.element.cell
+        at = places_of(mesh.points, mesh.cells)
+        jacobian = np.einsum("cai,qaj->cqij", at, shape_gradients(cell, self.positions))
+        around = self.body.kinematics.measure.around(at[..., 0] @ shape_values(cell, self.positions).T)
+        rule = quadrature(cell, quadrature_degree(self.body.element))[1]
+        return np.asarray(rule * determinants(jacobian) * around)
+
+    @cached_property
+    def gradients(self) -> Gradients:
+        """The gradients of the shape functions."""
+        mesh, cell, kinematics = self.body.mesh, self.body.element.cell, self.body.kinematics
+        at, values = places_of(mesh.points, mesh.cells), shape_values(cell, self.positions)
+        slopes = shape_gradients(cell, self.positions)
+        jacobian = np.einsum("cai,qaj->cqij", at, slopes)
+        return kinematics.gradients(slopes @ np.linalg.inv(jacobian), values, at[..., 0] @ values.T)
+
+    def strain(self, stress: np.ndarray) -> np.ndarray:
+        """Return the strain at the points, (n_cells, n_points, 3, 3); see `PointFields`."""
+        body, cells = self.body, self.body.mesh.cells
+        slope = self.gradients.of(as_hexahedra(self.displacement[cells], cells, body.mesh.dim))
+        strain = 0.5 * (slope + slope.swapaxes(2, 3))
+        if body.deforms_much:
+            strain += 0.5 * slope.swapaxes(2, 3) @ slope
+        for number, material in enumerate(body.materials):
+            mine = body.material_of_cells == number
+            young, poisson = isotropic_constants(material) or (np.inf, 0.0)
+            if body.mesh.dim == 2 and not strain[mine][..., 2, 2].any() and not stress[mine][..., 2, 2].any():
+                strain[mine, :, 2, 2] = -poisson / young * (stress[mine, :, 0, 0] + stress[mine, :, 1, 1])
+        return strain
+
+
+def point_fields(
+    torn: TornSystem,
+    name: str,
+    u: _dolfinx.fem.Function,
+    displacement: np.ndarray,
+    responses: Sequence[Response],
+) -> PointFields:
+    """Return stress and strain of a body at the points of its quadrature, on every rank. Collective.
+
+    `displacement`: of its nodes; `responses`: of materials of subdomains of this rank that remember.
+    """
+    body, comm = torn.scene.bodies[name], torn.decomposition.comm
+    points = _Points(body, displacement)
+    at = PointStress(u.function_space.mesh, body, comm, temperature_of(torn.scene.loads, name))
+    stress = _gathered(at, u, body, len(points.positions))
+    _put_mean_pressure(body, stress)
+    _put_history(torn, name, stress, responses)
+    return PointFields(points.positions, stress, points.strain(stress), body.element.cell)
+
+
+def _gathered(at: PointStress, u: _dolfinx.fem.Function, body: Body, count: int) -> np.ndarray:
+    """Return the stresses at the points of all cells in the body's order, on every rank. Collective."""
+    mesh, own = u.function_space.mesh, at.components(u)
+    number = cells_of_body(mesh, body.mesh.apart[0])
+    known = np.zeros((body.mesh.n_cells, count, own.shape[1]))
+    known[number] = own.reshape(len(number), count, own.shape[1])
+    return tensors(np.asarray(mesh.comm.allreduce(known)))
+
+
+def _put_mean_pressure(body: Body, stress: np.ndarray) -> None:
+    """Let linear cells of materials that depend on the mean change of volume have the mean of pressures."""
+    for number, material in enumerate(body.materials):
+        if body.mesh.order == 1 and has_mean_dilatation(material):
+            mine = body.material_of_cells == number
+            pressure = np.trace(stress[mine], axis1=2, axis2=3) / 3.0
+            stress[mine] += (pressure.mean(axis=1, keepdims=True) - pressure)[..., None, None] * np.eye(3)
+
+
+def _put_history(torn: TornSystem, name: str, stress: np.ndarray, responses: Sequence[Response]) -> None:
+    """Overwrite the stress in cells of materials with a history, which the ranks know. Collective."""
+    known = np.full_like(stress, np.nan)
+    for mesh, response in zip(torn.decomposition.meshes, responses, strict=False):
+        if mesh.body == name and response.stress is not None:
+            known[mesh.cells] = response.stress
+    here = ~np.isnan(known)
+    comm = torn.decomposition.comm
+    total = comm.allreduce(np.where(here, known, 0.0))
+    count = comm.allreduce(here.astype(float))
+    stress[count > 0.0] = total[count > 0.0]
+
+
+def stress_at_rest(torn: TornSystem, name: str, mesh: _dolfinx.mesh.Mesh) -> np.ndarray:
+    """Return the stress of a body that does not move, (n_cells, n_points, 3, 3). Collective.
+
+    Initial stress less what heat would take to be held back; of nonlinear materials none.
+    """
+    body, comm = torn.scene.bodies[name], torn.decomposition.comm
+    temperature = temperature_of(torn.scene.loads, name)
+    count = len(quadrature(body.element.cell, quadrature_degree(body.element))[0])
+    if not (temperature.loads or temperature.initial) or any(map(is_nonlinear, body.materials)):
+        return np.zeros((body.mesh.n_cells, count, 3, 3))
+    return _gathered(PointStress(mesh, body, comm, temperature), _dolfinx.coefficient(mesh, "u"), body, count)
+
+
+def internal_forces(body: Body, stress: np.ndarray) -> np.ndarray:
+    """Return ∫ σ : ∇v of a stress at the points of undeformed cells, by node, (n_nodes, dim), [force]."""
+    mesh, (cells, apart) = body.mesh, body.mesh.apart
+    points = _Points(body, np.zeros_like(mesh.points))
+    nodal = points.gradients.force(points.weights, stress)
+    count = int(cells.max()) + 1
+    force = np.stack(
+        [np.bincount(cells.ravel(), each.ravel(), count) for each in np.moveaxis(nodal, 2, 0)], 1
+    )
+    force = force if apart is None else np.asarray(apart.T @ force)
+    padded = np.pad(force, ((0, mesh.n_nodes - len(force)), (0, 0)))
+    return np.asarray(mesh.followers.followed(mesh.n_nodes).T @ padded) if mesh.followers else padded
