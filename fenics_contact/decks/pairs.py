@@ -11,6 +11,7 @@ import numpy as np
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.decks.bodies import DeckBodies
+from fenics_contact.decks.coincident import between_different
 from fenics_contact.decks.contact import Sides, closure_of, friction_of, interaction_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -71,7 +72,12 @@ def _surfaces(built: DeckBodies, of: Sides) -> list[tuple[Surface, Surface]]:
     ]  # fmt: skip
     if len(pairs) > 1:
         pairs = [(s, m) for s, m in pairs if _near(meshes[s.body], slave, meshes[m.body], master)]
-    return pairs
+    apart = between_different(pairs, meshes)
+    if len(apart) < len(pairs):
+        listed = ", ".join(f"{s.body} on {m.body}" for s, m in apart)
+        words = f"{of.slave} and {of.master} both have faces of the same bodies, which coincide"
+        built.deck.note(of.card, f"{words}: read as {listed}")
+    return apart
 
 
 def _near(one: BodyMesh, surface: str, other: BodyMesh, facing: str) -> bool:

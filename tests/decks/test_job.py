@@ -253,3 +253,19 @@ def test_files_of_both_programs_agree(kind: str, tmp_path: Path) -> None:
         if kind_of == "FORC" and kind.startswith("CAX"):  # radial ones do not balance there
             one, other = one[:, 1:], other[:, 1:]
         assert np.abs(one - other).max() <= 2e-4 * np.abs(other).max(), kind_of
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (shutil.which("cgx") and shutil.which("xvfb-run")), reason="needs cgx and xvfb-run")
+def test_graphix_opens_the_file(tmp_path: Path) -> None:
+    path = deck(tmp_path, TWO_BLOCKS)
+    job(path)
+    (tmp_path / "view.fbd").write_text("read model.frd\nprnt info\nds 10 e 4\nquit\n")
+    done = subprocess.run(
+        ["xvfb-run", "-a", "cgx", "-b", "view.fbd"],
+        cwd=tmp_path, env=clean_environment(), capture_output=True, text=True, timeout=60, errors="replace",
+    )  # fmt: skip
+    assert "n:16 e:2 " in done.stdout
+    assert "ds:10 " in done.stdout
+    pressure = max(row_of[3] for row_of in read_frd(path.with_suffix(".frd")).blocks[-1].values.values())
+    assert f"max:{pressure:e} at node:103" in done.stdout
