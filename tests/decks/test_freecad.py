@@ -45,6 +45,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ccx = program(folder / "ccx", "import sys; from fenics_contact.__main__ import ccx; sys.exit(ccx())")
     gmsh = program(folder / "gmsh", "import gmsh, sys; gmsh.initialize(); gmsh.open(sys.argv[-1])")
     given = {"CCX": ccx, "GMSH": gmsh, "FOLDER": str(folder), "EXAMPLES": " ".join(EXAMPLES)}
+    given["PAGE"] = str(ROOT / "docs" / "guide" / "freecad.md")
     given |= {"HOME": str(folder), "QT_QPA_PLATFORM": "offscreen"}
     environment = {name: value for name, value in clean_environment().items() if name != "PYTHONPATH"}
     script = ROOT / "tests" / "decks" / "freecad_examples.py"
