@@ -46,12 +46,15 @@ class Reduced(Integration):
 class Stabilised(Reduced):
     """Reduced integration with a small share of full integration.
 
-    At sections of bodies that are one cell across, reduced integration leaves motions without energy, which
-    no other cells resist: they get some by a share of full integration. `share`: of full integration;
-    stresses change by about as much.
+    Where bodies are one cell across, reduced integration leaves motions without energy, which no other cells
+    resist: they get some by a share of full integration. `share`: of full integration; where the motions are
+    those of a section alone, `AT_SECTIONS`, much less is enough.
+
+    A plate under another one needs 188 products with 1e-3, 516 with 1e-4 and 3861 with 1e-6, for the same
+    deflection to four digits; with 1e-2 a cylinder pinched on 16 x 16 cells is 0.5 % stiffer.
     """
 
-    share: float = 1e-6
+    share: float = 1e-3
     name = "reduced, stabilised"
 
     def stiffness(self, form: ufl.Form, in_full: Callable[[ufl.Form], ufl.Form]) -> ufl.Form:
@@ -60,10 +63,6 @@ class Stabilised(Reduced):
 
 
 FULL = Integration()
-
-
-def integration_of(name: str, cuts: object) -> Integration:
-    """Return the integration called "full" or "reduced"; `cuts`: where a section may be one cell across."""
-    if name == "full":
-        return FULL
-    return Stabilised() if cuts else Reduced()
+REDUCED = Reduced()
+STABILISED = Stabilised()
+AT_SECTIONS = Stabilised(1e-6)

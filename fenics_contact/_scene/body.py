@@ -14,7 +14,7 @@ from fenics_contact._base.checks import GivenVector, brief, checked
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._kinematics.element import Element
-from fenics_contact._kinematics.integration import integration_of
+from fenics_contact._kinematics.integration import AT_SECTIONS, FULL, REDUCED, STABILISED, Integration
 from fenics_contact._kinematics.revolution import Revolution
 from fenics_contact._kinematics.torsion import Torsion
 from fenics_contact._scene.effects import EffectName
@@ -27,6 +27,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.mesh.collapsed import has_collapsed
 from fenics_contact.mesh.faces import computed_rounding
+from fenics_contact.mesh.one_layer import touches_in_one_layer, two_wide
 
 #: Returns motions of points, (n, dim) -> (n, dim, n_modes).
 Modes: TypeAlias = Callable[[np.ndarray], np.ndarray]
@@ -52,7 +53,9 @@ class Body:
             nodes by 2 points in each direction instead of 3, those of other programs' C3D20R, CPE8R, CPS8R
             and CAX8R. They lock less in bending and near incompressibility, and deform in ways that cost no
             energy where a cell shares no face with another one: two cells in each direction are safe.
-            Bodies that also have prisms, pyramids or triangles are integrated in full.
+            "stabilised": the same with one thousandth of "full", for rows of single cells; "reduced" is that,
+            too, where contact or a tie acts on one layer of cells. Bodies that also have prisms, pyramids or
+            triangles are integrated in full.
 
     Example:
         >>> from fenics_contact.gallery import rectangle
@@ -68,7 +71,7 @@ class Body:
     material: Material | Mapping[str, Material]
     axisymmetric: bool = False
     torsion: bool = False
-    integration: Literal["full", "reduced"] = "full"
+    integration: Literal["full", "reduced", "stabilised"] = "full"
 
     def __post_init__(self) -> None:
         """Refuse materials of another dimension and regions without exactly one material."""
@@ -119,8 +122,19 @@ class Body:
     @property
     def element(self) -> Element:
         """The finite element for which its forms are written."""
-        integration = integration_of(self.integration, self.mesh.cuts)
-        return Element(self.mesh.cell_type, self.kinematics, integration)
+        return Element(self.mesh.cell_type, self.kinematics, self._integration)
+
+    def without_single_rows(self, partition: np.ndarray) -> np.ndarray:
+        """Return a partition whose subdomains are two cells wide, where reduced integration needs that."""
+        return two_wide(self.mesh, partition) if self.integration == "reduced" else partition
+
+    @property
+    def _integration(self) -> Integration:
+        if self.integration == "full":
+            return FULL
+        if self.integration == "stabilised" or touches_in_one_layer(self.mesh):
+            return STABILISED
+        return AT_SECTIONS if self.mesh.cuts else REDUCED
 
     @property
     def components(self) -> int:
@@ -220,12 +234,12 @@ def _check_regions(mesh: BodyMesh, materials: Mapping[str, Material]) -> None:
 
 def _check_integration(mesh: BodyMesh, integration: str) -> None:
     words = "reduced integration needs hexahedra of 20 or quadrilaterals of 8 nodes"
-    if integration == "reduced" and not mesh.centres:
+    if integration != "full" and not mesh.centres:
         raise InvalidInputError(
             f"{words}, got {mesh.cells_in_words}, which deform without energy by it: leave it out, or take "
             "serendipity(mesh)"
         )
-    if integration == "reduced" and has_collapsed(mesh.cells, mesh.dim):
+    if integration != "full" and has_collapsed(mesh.cells, mesh.dim):
         raise InvalidInputError(
             f"{words} alone, as in other cells it depends on the order of nodes, got {mesh.cells_in_words}: "
             "leave it out, or make the others a body of their own and glue it on"

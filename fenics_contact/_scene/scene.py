@@ -100,9 +100,8 @@ class Scene(SceneParts):
         """
         bodies = self.deforming
         each = -(-ranks // len(bodies))
-        return {
-            name: default_partition(body.mesh, each, body=name, lean=lean) for name, body in bodies.items()
-        }
+        found = {n: default_partition(body.mesh, each, body=n, lean=lean) for n, body in bodies.items()}
+        return {n: bodies[n].without_single_rows(partition) for n, partition in found.items()}
 
     def _facts(self) -> dict[str, Any]:
         return {

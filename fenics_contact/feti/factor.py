@@ -18,8 +18,8 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError
 FIXING_NODES = 4
 #: What leaves motions without energy, and what to do.
 ONE_LAYER = (
-    "one layer of cells by reduced integration (C3D20R in decks) that is in contact or tied may move without "
-    "energy: integrate it fully, or take two layers"
+    "rows of single cells by reduced integration (C3D20R in decks) may move without energy, as may one layer "
+    "of them in contact or tied: give the body integration='stabilised', or take two layers"
 )
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from fenics_contact.mesh.quality import scaled_jacobian
     from fenics_contact.mesh.refinement import Refinement, refined
     from fenics_contact.mesh.serendipity_cells import completed, serendipity
+    from fenics_contact.mesh.thin_bodies import Thickened, thickened
     from fenics_contact.mesh.transfer import MeshTransfer
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Chart",
     "MeshTransfer",
     "Refinement",
+    "Thickened",
     "bisection_partition",
     "boundary_faces",
     "completed",
@@ -32,6 +34,7 @@ __all__ = [
     "refined",
     "scaled_jacobian",
     "serendipity",
+    "thickened",
 ]
 
 __getattr__, __dir__ = late_names(__name__)

@@ -74,7 +74,7 @@ def test_a_factor_of_a_floating_stiffness_is_refused_whatever_its_rounding() -> 
         refused.append(str(error.value))
     unseen = [text for text in refused if "a factored stiffness must resist every motion" in text]
     assert unseen  # the library sees no fault in some of them
-    assert all("integrate it fully, or take two layers" in text for text in unseen)
+    assert all("integration='stabilised', or take two layers" in text for text in unseen)
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])

@@ -128,7 +128,7 @@ from fenics_contact.materials import (
     StVenantKirchhoff,
     TemperatureDependentElasticity,
 )
-from fenics_contact.mesh import Chart, MeshTransfer, refined
+from fenics_contact.mesh import Chart, MeshTransfer, refined, thickened
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results import (
@@ -237,6 +237,7 @@ def objects() -> dict[str, Any]:
         ),
         TransferredState(state, {"block": MeshTransfer()}),
         MeshTransfer(),
+        thickened(np.eye(3), [[0, 1, 2]], 0.1),
         Limits(levels=2),
         NewtonSteps(((0.1, 1e-3, 1e-7),)), TangentNewton(), AutomaticSteps(), DesignResponse(shape),
         SceneResponse(lambda load: scene, {"load": 1.0}, {"energy": lambda state: 0.0}, MPI.COMM_SELF),
