@@ -44,7 +44,8 @@ from fenics_contact.readers.deck_bodies import (
     split_sections,
 )
 from fenics_contact.readers.deck_cards import Card, Origin
-from fenics_contact.readers.deck_mesh import DeckMesh, read_mesh_cards
+from fenics_contact.readers.deck_mesh import DeckMesh
+from fenics_contact.readers.deck_shells import read_solid_mesh
 from fenics_contact.readers.deck_straightened import straightened
 
 
@@ -98,7 +99,7 @@ class DeckCards:
     @classmethod
     def of(cls, name: str, cards: Sequence[Card], record: Record) -> DeckCards:
         """Sort the cards of a deck."""
-        mesh = straightened(read_mesh_cards(cards), record.note)
+        mesh = straightened(read_solid_mesh(cards), record.note)
         sections, of_element = read_sections(cards, mesh)
         materials, orientations = read_materials(cards)
         mesh, sections, of_element, orientations = by_distribution(

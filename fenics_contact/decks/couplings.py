@@ -138,7 +138,7 @@ def _range(card: Card, row: int) -> range:
 
 def _rigid_body(card: Card, mesh: DeckMesh) -> Driven:
     if card.name_of("NSET"):
-        nodes = mesh.nodes_named(card.name_of("NSET"), card)
+        nodes = mesh.shells.across(mesh.nodes_named(card.name_of("NSET"), card))
         name = card.name_of("NSET")
     else:
         name = card.required("ELSET")

@@ -20,6 +20,7 @@ from fenics_contact.decks.couplings import drawn
 from fenics_contact.decks.loads import LoadBuilder
 from fenics_contact.decks.names import names_of
 from fenics_contact.decks.pairs import Pairs, pairs_of
+from fenics_contact.decks.shells import ShellPrints, on_solids
 from fenics_contact.decks.spring_ends import springs_of
 from fenics_contact.decks.supports import SupportBuilder
 from fenics_contact.decks.tables import Print, PrintTable
@@ -74,6 +75,7 @@ class Deck:
     node_sets: Mapping[str, np.ndarray]
     element_sets: Mapping[str, np.ndarray]
     mesh: MeshCards = field(repr=False)
+    _shells: ShellPrints = field(repr=False)
     instances: Instances = field(default=NO_INSTANCES, repr=False)
     _origins: Mapping[tuple[str, str], Origin] = field(default_factory=dict, repr=False)
 
@@ -161,13 +163,14 @@ class Deck:
         """Return displacements or reactions of nodes behind their numbers."""
         found = list[np.ndarray]()
         for body, nodes in self.node_numbers.items():
-            mine = np.flatnonzero((nodes > 0) & np.isin(nodes, self.node_sets[where] if where else nodes))
             if variable == "U":
-                values = state.gather_displacement(body)[mine]
+                found.append(self._shells.moved(nodes, state.gather_displacement(body)))
             else:
-                values = state.nodal_reactions(body)[mine] * self.thickness
-            found.append(np.column_stack([nodes[mine], values]))
+                found.append(self._shells.summed(nodes, state.nodal_reactions(body) * self.thickness))
+        if variable == "RF" and self._shells.is_held:
+            found.append(self._shells.held(state.constraints()))
         rows = np.vstack(found)
+        rows = rows[np.isin(rows[:, 0], self.node_sets[where])] if where else rows
         nodes, first, number = np.unique(rows[:, 0], return_index=True, return_inverse=True)
         if variable == "U" or len(nodes) == len(rows):
             return rows[first]
@@ -235,6 +238,7 @@ def _read(path: Path, chosen: Chosen = _all) -> Deck:
     try:
         deck = DeckCards.of(path.name, cards, record)
         deck, steps = steps_of(deck)
+        steps = on_solids(deck, steps)
         deck = deck.cut_where_loaded(steps)
         deck.note_without_effect()
         built = bodies_of(deck, steps, names_of(deck, steps))
@@ -280,6 +284,7 @@ def _built(built: DeckBodies) -> Deck:
         node_sets={name: np.sort(mesh.numbers[members]) for name, members in mesh.node_sets.items()},
         element_sets={n: np.sort(mesh.element_numbers[members]) for n, members in mesh.element_sets.items()},
         mesh=built.mesh_cards(),
+        _shells=ShellPrints.of(deck, built.steps),
         instances=deck.cards[0].instances,
         _origins=deck.record.origins,
     )

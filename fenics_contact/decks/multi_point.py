@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact.readers.deck_cards import AtLine, Card
 from fenics_contact.readers.deck_mesh import DeckMesh
@@ -21,6 +22,56 @@ class Equation(AtLine):
     nodes: tuple[int, ...]
     components: tuple[int, ...]
     factors: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Many equations Σ c u = 0: the number of the equation, node, component and factor of each term."""
+
+    number: np.ndarray
+    node: np.ndarray
+    component: np.ndarray
+    factor: np.ndarray
+
+    @property
+    def columns(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Number, node, component and factor."""
+        return self.number, self.node, self.component, self.factor
+
+    @classmethod
+    def of(cls, matrix: sp.csr_matrix, given: sp.csr_matrix) -> Rows:
+        """Return A u = B v of displacements u of all nodes, and v with rotations, a row each."""
+        left, right = matrix.tocoo(), given.tocoo()
+        return cls(
+            np.append(left.row, right.row).astype(np.int64),
+            np.append(left.col // 3, right.col // 6).astype(np.int64),
+            np.append(left.col % 3, right.col % 6).astype(np.int64),
+            np.append(left.data, -right.data),
+        )
+
+    @classmethod
+    def joined(cls, parts: Iterable[Rows]) -> Rows:
+        """Return all of several, which are numbered anew."""
+        parts = [each for each in parts if len(each.number)]
+        ends = np.cumsum([0, *(each.number.max() + 1 for each in parts)])
+        number = [each.number + start for each, start in zip(parts, ends, strict=False)]
+        names = ("node", "component", "factor")
+        rest = ([getattr(NO_ROWS, n), *(getattr(each, n) for each in parts)] for n in names)
+        return cls(np.concatenate([NO_ROWS.number, *number]), *map(np.concatenate, rest))
+
+    @classmethod
+    def of_equations(cls, equations: Sequence[Equation]) -> Rows:
+        """Return equations as rows."""
+        number = np.repeat(np.arange(len(equations)), [len(each.nodes) for each in equations])
+        node, component, factor = (
+            np.array([entry for each in equations for entry in getattr(each, name)], dtype=kind)
+            for name, kind in (("nodes", np.int64), ("components", np.int64), ("factors", np.float64))
+        )
+        return cls(number, node, component, factor)
+
+
+_NONE = np.zeros(0, dtype=np.int64)
+NO_ROWS = Rows(_NONE, _NONE, _NONE, np.zeros(0))
 
 
 def read_equations(cards: Sequence[Card], mesh: DeckMesh) -> list[Equation]:

@@ -309,7 +309,7 @@ class _Naming:
     def _single_faces(self, several: Sequence[DistributedLoad]) -> Faces:
         """Return the faces of single elements."""
         numbers = np.array([int(each.where[0]) for each in several])
-        sides = np.array([int(each.where[1][1:]) - 1 for each in several])
+        sides = np.array([int(each.where[1][1:] or 1) - 1 for each in several])
         return Faces(self.mesh.positions(numbers, "element", several[0].card), sides)
 
     def _faces(self, pressed: DistributedLoad) -> Faces:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.decks.initial_stress import kind_of
-from fenics_contact.decks.multi_point import Equation
+from fenics_contact.decks.multi_point import NO_ROWS, Equation, Rows
 from fenics_contact.decks.vocabulary import PRINT_CARDS, PROCEDURES
 from fenics_contact.readers.deck_cards import AtLine, Card, DeckError, plain
 from fenics_contact.readers.deck_mesh import DeckMesh
@@ -324,7 +324,7 @@ class DeckSteps:
     """The load steps of a deck.
 
     `targets`: what is held, in the order of the deck, before and in all steps; `at_rest`: what is held in the
-    first step, or without any, all at zero.
+    first step, or without any, all at zero; `rows`: further equations.
     """
 
     steps: Sequence[Step]
@@ -333,6 +333,7 @@ class DeckSteps:
     initial: np.ndarray
     at_rest: Instant
     equations: Sequence[Equation] = ()
+    rows: Rows = NO_ROWS
 
     @cached_property
     def instants(self) -> Sequence[Instant]:
@@ -536,7 +537,7 @@ def _distributed(card: Card, mesh: DeckMesh, by: int) -> Iterator[DistributedLoa
         elif label in ("GRAV", "CENTRIF"):
             _check_weight(card, row, label, numbers)
             mesh.weighed(where[0], card, row)
-        elif label[:1] == "P" and label[1:].isdecimal() and numbers:
+        elif _is_pressure(label) and numbers:
             if not where[0].isdecimal():
                 mesh.faces_of(mesh.elements_named(where[0], card, row), label, card, row)
         else:
@@ -553,12 +554,17 @@ def _check_weight(card: Card, row: int, label: str, numbers: Sequence[float]) ->
         raise card.error(f"{label} needs {what}, its last three numbers, got zeros", row)
 
 
+def _is_pressure(label: str) -> bool:
+    """Return whether a label is that of a face, or of the side of a shell that a pressure acts on."""
+    return label == "P" or (label[:1] == "P" and label[1:].isdecimal())
+
+
 def _check_single_faces(card: Card, mesh: DeckMesh) -> None:
     """Reject single elements and faces that are not there, those of one label at once."""
     rows: dict[str, list[int]] = {}
     for row, entries in enumerate(card.rows):
         label = plain(entries[1]) if len(entries) > 1 else ""
-        if plain(entries[0]).isdecimal() and label[:1] == "P" and label[1:].isdecimal():
+        if plain(entries[0]).isdecimal() and _is_pressure(label):
             rows.setdefault(label, []).append(row)
     for label, some in rows.items():
         numbers = np.array([plain(card.rows[row][0]) for row in some], dtype=np.float64)
@@ -599,7 +605,10 @@ def _check_span(card: Card, row: int, first: int, last: int) -> None:
 
 def _components(card: Card, row: int, entries: Sequence[str]) -> tuple[range | tuple[int, ...], float]:
     """Return the components, from zero, that a line of *BOUNDARY holds, and their value."""
-    named = {"XSYMM": (0,), "YSYMM": (1,), "ZSYMM": (2,), "PINNED": (0, 1, 2), "ENCASTRE": (0, 1, 2)}
+    named = {
+        "XSYMM": (0, 4, 5), "YSYMM": (1, 3, 5), "ZSYMM": (2, 3, 4),
+        "PINNED": (0, 1, 2), "ENCASTRE": tuple(range(6)),
+    }  # fmt: skip
     if len(entries) > 1 and plain(entries[1]) in named:
         return named[plain(entries[1])], 0.0
     numbers = card.floats(row, 1) or [0.0]

@@ -16,6 +16,7 @@ from fenics_contact._scene.preloads import Section as CutAt
 from fenics_contact._scene.supports import AnySupport, HoldCurrent, RigidSurface, Roller, Support
 from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.couplings import Bolt, Driven, rigid_surface
+from fenics_contact.decks.multi_point import Rows
 from fenics_contact.decks.rigid_links import by_small_turns, following, in_their_space, spread_out
 from fenics_contact.decks.springs import name_of
 from fenics_contact.decks.steps import Instant
@@ -178,19 +179,15 @@ class SupportBuilder:
         return moved
 
     @cached_property
-    def _entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Equation, node, component and factor of all terms of equations of several nodes."""
-        several = [each for each in self.built.steps.equations if len(set(each.nodes)) > 1]
-        number = np.repeat(np.arange(len(several)), [len(each.nodes) for each in several])
-        node, component, factor = (
-            np.array([entry for each in several for entry in getattr(each, name)], dtype=kind)
-            for name, kind in (("nodes", np.int64), ("components", np.int64), ("factors", np.float64))
-        )
-        return number, node, component, factor
+    def _rows(self) -> Rows:
+        """The terms of equations of several nodes."""
+        steps = self.built.steps
+        several = [each for each in steps.equations if len(set(each.nodes)) > 1]
+        return Rows.joined([Rows.of_equations(several), steps.rows])
 
     def _terms(self) -> list[ConstraintTerm]:
         """Return the terms of the equations, one for each body."""
-        number, node, component, factor = self._entries
+        number, node, component, factor = self._rows.columns
         axes, parts = self.built.deck.axes, self.built.parts
         along = np.eye(6, 3)[component]
         for place in np.flatnonzero(axes.turned(node)):
@@ -209,7 +206,7 @@ class SupportBuilder:
 
     def values(self, instant: Instant) -> Mapping[str, Any] | None:
         """Return the values of equations at a time, of nodes without elements; None without any."""
-        number, node, component, factor = self._entries
+        number, node, component, factor = self._rows.columns
         outside = ~self.built.deck.inside[node] | (component > 2)
         if not outside.any():
             return None

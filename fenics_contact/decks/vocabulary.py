@@ -18,8 +18,9 @@ MATERIAL_CARDS = {
 MESH_CARDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"}
 #: Cards of the model that are read.
 MODEL_CARDS = {
-    "SOLIDSECTION", "MATERIAL", "ORIENTATION", "DISTRIBUTION", "AMPLITUDE", "INITIALCONDITIONS", "TRANSFORM",
-    "CONTACTPAIR", "SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "CLEARANCE", "TIE", "RIGIDBODY",
+    "SOLIDSECTION", "SHELLSECTION", "NODALTHICKNESS", "MATERIAL", "ORIENTATION", "DISTRIBUTION", "AMPLITUDE",
+    "INITIALCONDITIONS", "TRANSFORM", "CONTACTPAIR",
+    "SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "CLEARANCE", "TIE", "RIGIDBODY",
     "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTINGCOUPLING", "EQUATION", "PRE-TENSIONSECTION",
     "CYCLICSYMMETRYMODEL", "MPC", "SPRING", "MASS",
 }  # fmt: skip
@@ -53,7 +54,6 @@ WITHOUT_EFFECT = {
     "REFINEMESH": "solved on the mesh as it is given, where the other program refines it and solves again",
     "USEREFINEDMESH": "solved on the mesh as it is given",
     "DISTRIBUTIONTABLE": "names what the numbers of a *DISTRIBUTION are",
-    "NODALTHICKNESS": "thickness of shells, of which there are none",
     "CONTROLS": "how the other program iterates",
     "SOLUTIONTECHNIQUE": "how the other program iterates",
     "CONTACTCONTROLS": "how the other program iterates",
@@ -88,6 +88,8 @@ PARAMETERS: dict[str, set[str]] = {
     "ELSET": {"ELSET", "GENERATE"},
     "SURFACE": {"NAME", "TYPE"},
     "SOLIDSECTION": {"ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "CONTROLS"},  # OFFSET of layers
+    "SHELLSECTION": {"ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODALTHICKNESS"},
+    "NODALTHICKNESS": set(),
     "MATERIAL": {"NAME"},
     "ELASTIC": {"TYPE"},
     "PLASTIC": {"HARDENING"},
@@ -131,8 +133,7 @@ PARAMETERS: dict[str, set[str]] = {
 }
 #: Cards that change what is solved, by what they are of.
 STRUCTURES = {
-    "SHELLSECTION": "shells are not solved here: mesh the part with solid elements",
-    "SHELLGENERALSECTION": "shells are not solved here: mesh the part with solid elements",
+    "SHELLGENERALSECTION": "shells of given stiffness are not solved here: give *SHELL SECTION",
     "MEMBRANESECTION": "membranes are not solved here: mesh the part with solid elements",
     "BEAMSECTION": "beams are not solved here: mesh the part with solid elements",
     "BEAMGENERALSECTION": "beams are not solved here: mesh the part with solid elements",

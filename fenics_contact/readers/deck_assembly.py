@@ -17,11 +17,12 @@ from fenics_contact.readers.deck_parameters import with_parameters
 
 FRAMES = {"PART", "ENDPART", "ASSEMBLY", "ENDASSEMBLY", "INSTANCE", "ENDINSTANCE"}
 """The cards that make up the structure."""
-_IN_PARTS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "SOLIDSECTION", "ORIENTATION"}
+_IN_PARTS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "SOLIDSECTION", "SHELLSECTION", "ORIENTATION"}
 #: Parameters that name what belongs to a part.
 _NAMES = {
     "NODE": ("NSET",), "ELEMENT": ("ELSET",), "NSET": ("NSET", "ELSET"), "ELSET": ("ELSET",),
     "SURFACE": ("NAME",), "SOLIDSECTION": ("ELSET", "ORIENTATION"), "ORIENTATION": ("NAME",),
+    "SHELLSECTION": ("ELSET", "ORIENTATION"),
 }  # fmt: skip
 
 

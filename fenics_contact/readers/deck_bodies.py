@@ -20,7 +20,8 @@ from fenics_contact.mesh.quality import AT_GAUSS_POINTS, jacobians, thickness
 from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, one_array
 from fenics_contact.readers.deck_assembly import read_cards
 from fenics_contact.readers.deck_cards import Card
-from fenics_contact.readers.deck_mesh import NO_FACES, Block, DeckMesh, Faces, Named, read_mesh_cards
+from fenics_contact.readers.deck_mesh import NO_FACES, Block, DeckMesh, Faces, Named
+from fenics_contact.readers.deck_shells import read_solid_mesh
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -37,13 +38,17 @@ class Section:
     thickness: float
 
 
+#: Cards that give elements their material.
+SECTIONS = ("SOLIDSECTION", "SHELLSECTION")
+
+
 def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section], np.ndarray]:
     """Return the sections of a deck, and the number of the section of each element, −1 without one."""
     sections: list[Section] = []
     of_element = np.full(len(mesh.element_numbers), -1)
     for card in cards:
         name = card.name_of("ELSET")
-        if card.name == "SOLIDSECTION" and (name in mesh.element_sets or name not in mesh.link_sets):
+        if card.name in SECTIONS and (name in mesh.element_sets or name not in mesh.link_sets):
             name = card.required("ELSET")
             of_element[mesh.elements_named(name, card)] = len(sections)
             thick = card.floats(0)[0] if card.lines and card.rows[0][0] else 1.0
@@ -358,7 +363,7 @@ def _check_block(block: Block, points: np.ndarray) -> None:
         first = map(block.card.label, block.numbers[bad[:5]].tolist())
         numbers = ", ".join(first) + (", ..." if len(bad) > 5 else "")
         ends = np.cumsum([line.strip().rstrip(",").count(",") + 1 for line in block.card.lines])
-        width = 1 + len(block.element.written)
+        width = 1 + block.element.listed
         row = int(np.searchsorted(ends, block.records[bad[0]] * width, side="right"))
         raise block.card.error(
             f"every element must have a positive Jacobian at its Gauss points, {len(bad)} of "
@@ -417,7 +422,7 @@ def read_deck_mesh(path: str | Path, comm: MPI.Comm | None = None) -> dict[str, 
 def _read(path: Path) -> dict[str, BodyMesh]:
     require_file(path, "a deck")
     cards = read_cards(path)
-    mesh = read_mesh_cards(cards)
+    mesh = read_solid_mesh(cards)
     sections, of_element = read_sections(cards, mesh)
     exterior = Exterior.of(mesh)
     surfaces = {}

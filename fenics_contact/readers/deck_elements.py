@@ -56,6 +56,16 @@ class Element:
         """Positions of its nodes in the order in which the deck lists them."""
         return range(self.count)
 
+    @property
+    def listed(self) -> int:
+        """Number of nodes that the deck lists for it."""
+        return len(self.written)
+
+    def side(self, label: str) -> int:
+        """Return the position of the face that a label names, "S3" or "P3", −1 where there is none."""
+        place = int(label[1:]) - 1 if label[1:].isdecimal() else -1
+        return place if place < len(self.faces) else -1
+
     @cached_property
     def edges(self) -> Sequence[tuple[int, int, int]]:
         """Positions of the ends of its edges and of the nodes in their middles, without these nothing."""
@@ -121,6 +131,50 @@ _EDGES: dict[str, Sequence[tuple[int, int]]] = {
 _TYPE = re.compile(r"(C3D|CPS|CPE|CAX)(\d+)([RIHMT]*)")
 
 
+@dataclass(frozen=True, eq=False)
+class Shell(Element):
+    """Elements of a surface, whose sides and edges are faces of the solid cell that they become."""
+
+    @property
+    def dim(self) -> int:
+        """Dimension of its space."""
+        return 3
+
+    @property
+    def faces(self) -> Sequence[Sequence[int]]:
+        """Positions of the corners of both sides, and of its edges."""
+        corners = tuple(range(3 if self.count in (3, 6) else 4))
+        return (corners, corners, *zip(corners, (*corners[1:], 0), strict=True))
+
+    def side(self, label: str) -> int:
+        """Return the position of the face that a label names: of both sides "SNEG" and "SPOS"."""
+        return _SIDES[label] if label in _SIDES else super().side(label)
+
+
+@dataclass(frozen=True, eq=False)
+class Layer(Element):
+    """Solid cells that shells have become; `listed`: number of nodes of the shells."""
+
+    listed: int = 0  # type: ignore[misc]
+
+    @classmethod
+    def of(cls, shell: Element) -> Layer:
+        """Return that of shells."""
+        if shell.count in (3, 6):
+            return cls("C3D15", "solid", "wedge15", 15, "", shell.count)
+        variant = "" if shell.name == "S8" else "R"
+        return cls(f"C3D20{variant}", "solid", "hexahedron20", 20, variant, shell.count)
+
+    def side(self, label: str) -> int:
+        """Return the position of the face that a label names: of both sides "SNEG" and "SPOS"."""
+        return _SIDES[label] if label in _SIDES else super().side(label)
+
+
+#: Faces of shells that have names; a pressure without a number acts on the first.
+_SIDES = {"SNEG": 0, "SPOS": 1, "P": 0}
+_SHELLS = {"S3": 3, "S3R": 3, "S4": 4, "S4R": 4, "S6": 6, "S8": 8, "S8R": 8}
+
+
 #: What elements of other programs are, by how their types begin.
 _OTHERS = {
     "STRI": ", shells,", "SC": ", shells,", "S": ", shells,", "B": ", beams,",
@@ -132,6 +186,8 @@ _OTHERS = {
 def element_of(card: Card) -> Element:
     """Return the type of the elements of a card."""
     name = card.required("TYPE")
+    if name in _SHELLS:
+        return Shell(name, "shell", "shell", _SHELLS[name], "")
     match = _TYPE.fullmatch(name)
     kind = _KINDS[match.group(1)] if match else ""
     count = int(match.group(2)) if match else 0
@@ -139,8 +195,8 @@ def element_of(card: Card) -> Element:
     if match is None or cell is None:
         what = next((words for start, words in _OTHERS.items() if name.startswith(start)), "")
         raise card.error(
-            f"elements of type {name}{what} are not supported: give solids (C3D4, 6, 8, 10, 15, 20), plane "
-            "ones (CPS, CPE 3, 4, 6, 8) or axisymmetric ones (CAX)"
+            f"elements of type {name}{what} are not supported: give solids (C3D4, 6, 8, 10, 15, 20), shells "
+            "(S3, 4, 6, 8), plane ones (CPS, CPE 3, 4, 6, 8) or axisymmetric ones (CAX)"
         )
     return Element(name, kind, cell, count, match.group(3))
 
@@ -207,9 +263,11 @@ def without_repeated(
         found = _collapse(element.cell, tuple(row.tolist())) if element.cell in _WHOLE else None
         if found is None:
             remedy = (
-                "take CPS6, CPE6, CAX6, C3D15 or C3D10"
+                "take S3 or S6"
+                if element.kind == "shell"
+                else "take CPS6, CPE6, CAX6, C3D15 or C3D10"
                 if element.count > 8 or element.dim == 2
-                else ("they must be a prism, a pyramid or a tetrahedron")
+                else "they must be a prism, a pyramid or a tetrahedron"
             )
             raise card.error(
                 f"{len(mine)} elements {element.name} list nodes twice, first "

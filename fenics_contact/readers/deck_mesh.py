@@ -10,6 +10,7 @@ import numpy as np
 from fenics_contact.readers.deck_cards import Card, DeckError, plain
 from fenics_contact.readers.deck_elements import Element, element_of, without_repeated
 from fenics_contact.readers.deck_links import Link, is_of_links, read_links, sets_of_links
+from fenics_contact.readers.deck_shell_nodes import NO_SHELLS, ShellNodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,8 @@ class DeckMesh:
     """What a deck says of its mesh; nodes and elements are known by their positions in it.
 
     `numbers`: numbers of the nodes in the deck, ascending; `origins`: name of a set -> its first card;
-    `links`: elements that are no cells; `link_sets`: name of a set of elements -> such elements of it.
+    `links`: elements that are no cells; `link_sets`: name of a set of elements -> such elements of it;
+    `shells`: nodes across the thickness of shells.
     """
 
     numbers: np.ndarray
@@ -71,6 +73,7 @@ class DeckMesh:
     origins: dict[str, Card] = field(default_factory=dict)
     links: list[Link] = field(default_factory=list)
     link_sets: dict[str, list[Link]] = field(default_factory=dict)
+    shells: ShellNodes = NO_SHELLS
 
     @property
     def block_of(self) -> np.ndarray:
@@ -172,16 +175,17 @@ class DeckMesh:
 
     def faces_of(self, elements: np.ndarray, label: str, card: Card, row: int | None) -> Faces:
         """Return one face of each of some elements, by its label: "S3", "P3"."""
-        side = int(label[1:]) - 1 if label[1:].isdecimal() else -1
-        block_of = self.block_of
-        for number in np.unique(block_of[elements]):
+        block_of, sides = self.block_of[elements], np.zeros(len(elements), dtype=np.int64)
+        for number in np.unique(block_of):
             element = self.blocks[number].element
-            if not 0 <= side < len(element.faces):
+            side = element.side(label)
+            if side < 0:
                 raise card.error(f"{element.name} has {len(element.faces)} faces, got {label!r}", row)
             if not element.faces[side]:
-                first = card.label(self.element_numbers[elements[block_of[elements] == number][0]])
+                first = card.label(self.element_numbers[elements[block_of == number][0]])
                 raise card.error(f"face {label!r} of element {first} is only an edge: leave it out", row)
-        return Faces(elements, np.full(len(elements), side))
+            sides[block_of == number] = side
+        return Faces(elements, sides)
 
 
 def _written(token: str) -> int:

@@ -24,7 +24,7 @@ WRONG = [
     ("*STATIC", "*FANCY CARD\n*STATIC", "FANCY", r"\*FANCY CARD: this card is not known: the guide lists"),
     ("BAR_X1, 1, 10.", "BAR_X9, 1, 10.", "BAR_X9", r"node set 'BAR_X9' is not there; did you mean BAR_X\d\?"),
     ("BAR_X1, 1, 10.", "99, 1, 10.", "99, 1", r"\*CLOAD: node 99 is not there: correct the number"),
-    ("TYPE=C3D8", "TYPE=S4", "TYPE=S4", r"elements of type S4, shells, are not supported: give solids"),
+    ("TYPE=C3D8", "TYPE=S9R5", "TYPE=S9R5", r"elements of type S9R5, shells, are not supported: give solids"),
     ("TYPE=C3D8,", "", "*ELEMENT", r"\*ELEMENT: needs the parameter TYPE=, got ELSET=BAR: add it"),
     (
         "1, 1, 5, 7, 3, 2, 6, 8, 4",
@@ -243,17 +243,17 @@ def test_the_command_line_runs_a_deck(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def test_all_that_is_not_known_is_named_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Cards, types of elements and parameters, each once with its line, and what structures are."""
-    more = "*ELEMENT, TYPE=S4\n8, 1, 2, 3, 4\n*SHELL SECTION, ELSET=X\n1.\n*DASHPOT, ELSET=Y\n"
+    more = "*ELEMENT, TYPE=S9R5\n8, 1, 2, 3, 4\n*SHELL GENERAL SECTION, ELSET=X\n1.\n*DASHPOT, ELSET=Y\n"
     more += "*FANCY\n*FANCY\n"
     text = GOOD.replace("*STEP\n", more + "*STEP\n").replace("*CLOAD\n", "*CLOAD, LOAD CASE=2\n")
     path = deck(tmp_path, text)
     assert main(["run", str(path), "--plan"]) == 2
     words = capsys.readouterr().err
     lines = path.read_text().splitlines()
-    first = 1 + lines.index("*ELEMENT, TYPE=S4")
-    assert f"line {first}: *ELEMENT: elements of type S4, shells, are not supported" in words
+    first = 1 + lines.index("*ELEMENT, TYPE=S9R5")
+    assert f"line {first}: *ELEMENT: elements of type S9R5, shells, are not supported" in words
     for card, what in (
-        ("*SHELL SECTION, ELSET=X", "shells are not solved here: mesh the part with solid elements"),
+        ("*SHELL GENERAL SECTION, ELSET=X", "shells of given stiffness are not solved here"),
         ("*DASHPOT, ELSET=Y", "dashpots are not solved here"),
         ("*FANCY", "this card is not known: the guide lists those that are"),
         ("*CLOAD, LOAD CASE=2", "the parameter LOADCASE is not read"),

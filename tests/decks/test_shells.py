@@ -1,0 +1,345 @@
+"""Shells of decks, compared with what CalculiX 2.20 prints for the same decks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.decks import Deck, read_deck
+from fenics_contact.readers.deck_cards import DeckError
+from tests.fem.surfaces import grid, node_at
+
+PLATE = grid(4, 2, lambda w: w @ np.array([[40.0, 0, 0], [0, 20.0, 0]]))
+FIXED, FREE = [np.flatnonzero(PLATE[2][:, 0] == end) for end in (0.0, 1.0)]
+TIP, BESIDE, MIDDLE = (node_at(PLATE[2], *at) for at in ((1, 0.5), (1, 0.25), (0.5, 0.5)))
+
+
+def text_of(
+    points: np.ndarray,
+    facets: Mapping[str, np.ndarray],
+    held: Sequence[tuple[np.ndarray, str]],
+    loads: str,
+    section: str = "",
+    *,
+    thick: float = 4.0,
+    law: str = "200000., 0.3",
+    model: str = "",
+    step: str = "*STEP\n*STATIC",
+) -> str:
+    """Return a deck of shells: nodes that facets have, numbered from 1, in the set NALL."""
+    used = np.unique(np.concatenate([each.ravel() for each in facets.values()]))
+    lines = ["*NODE, NSET=NALL", *(f"{k + 1}, {', '.join(map(repr, points[k].tolist()))}" for k in used)]
+    number = 0
+    for kind, rows in facets.items():
+        lines.append(f"*ELEMENT, TYPE={kind}, ELSET=ALL")
+        for row in rows.tolist():
+            number += 1
+            lines.append(", ".join(map(str, [number, *(k + 1 for k in row)])))
+    lines += ["*MATERIAL, NAME=M", "*ELASTIC", law, "*DENSITY", "1."]
+    lines += [f"*SHELL SECTION, ELSET=ALL, MATERIAL=M{section}", str(thick), model, "*BOUNDARY"]
+    lines += [f"{k + 1}, {what}" for nodes, what in held for k in nodes if k in used]
+    lines += [step, loads, "*NODE PRINT, NSET=NALL", "U", "*NODE PRINT, NSET=NALL, TOTALS=ONLY", "RF"]
+    return "\n".join(line for line in [*lines, "*END STEP"] if line) + "\n"
+
+
+def solved(folder: Path, text: str) -> tuple[Deck, dict[int, np.ndarray], np.ndarray]:
+    """Return the deck, displacements by nodes from zero, and the sum of reactions."""
+    path = folder / "shell.inp"
+    path.write_text(text)
+    deck = read_deck(path)
+    state = deck.solve(MPI.COMM_WORLD, tolerance=1e-9)[-1]
+    moved, reaction = deck.tables(state)
+    return deck, {int(row[0]) - 1: row[1:] for row in moved.rows}, reaction.rows[-1, 1:]
+
+
+CLAMPED = [(FIXED, "1, 6")]
+HINGED = [(FIXED, "1, 3"), (FREE, "3, 3")]
+#: What is held and loaded, the section, the node and what CalculiX prints for it.
+CASES = {
+    "force at a corner": (CLAMPED, f"*CLOAD\n{TIP + 1}, 3, 1000.", "", TIP, (0, 0, 9.475214e-01)),
+    "force between corners": (CLAMPED, f"*CLOAD\n{BESIDE + 1}, 3, 1000.", "", BESIDE, (0, 0, 9.712999e-01)),
+    "moment at a corner": (CLAMPED, f"*CLOAD\n{TIP + 1}, 5, 1000.", "", TIP, (0, 0, -3.677770e-02)),
+    "moment between corners": (CLAMPED, f"*CLOAD\n{BESIDE + 1}, 5, 1000.", "", BESIDE, (0, 0, -3.714207e-02)),
+    "hinges": (HINGED, "*DLOAD\nALL, P, 1.", "", MIDDLE, (1.590130e-05, 0, 3.070005e-02)),
+    "offset": (
+        HINGED, "*DLOAD\nALL, P, 1.", ", OFFSET=0.5", MIDDLE, (1.590130e-05, 0, 3.070005e-02),
+    ),
+    "rotation held": (
+        [(FIXED, "1, 3"), (FIXED, "5, 5")], "*DLOAD\nALL, P, 1.", "", TIP, (3.074983e-05, 0, 2.788523e-01),
+    ),
+    "rotation given": (
+        [(FIXED, "1, 6"), (FREE, "5, 5, 0.01")], "*DLOAD\nALL, P, 1.", "", TIP,
+        (3.074983e-05, 0, -1.039210e-01),
+    ),
+    "weight, end lifted": (
+        [(FIXED, "1, 6"), (FREE, "3, 3, 0.1")], "*DLOAD\nALL, GRAV, 10., 0., 0., -1.", "",
+        MIDDLE, (0, 0, -4.426520e-01),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("case", CASES)
+def test_plates_move_as_calculix_prints(case: str, tmp_path: Path) -> None:
+    held, loads, section, node, calculix = CASES[case]
+    _, moved, _ = solved(tmp_path, text_of(PLATE[0], {"S8R": PLATE[1]}, held, loads, section))
+    np.testing.assert_allclose(moved[node], calculix, atol=1e-5 * np.abs(calculix).max())
+
+
+def triangles(facets: np.ndarray, corners: int) -> np.ndarray:
+    """Two triangles of 3 or 6 nodes for each quadrilateral, whose centre is the node behind its fifth."""
+    centre = facets[:, 4] + 1
+    first = [facets[:, [0, 1, 2, 4, 5]], centre[:, None]]
+    second = [facets[:, [0, 2, 3]], centre[:, None], facets[:, [6, 7]]]
+    return np.concatenate([np.hstack(first), np.hstack(second)])[:, :corners]
+
+
+@pytest.mark.parametrize(("kind", "sag"), [("S8", 2.747404e-01), ("S6", 2.758519e-01)])
+def test_other_quadratic_shells_are_full_ones(kind: str, sag: float, tmp_path: Path) -> None:
+    """Prisms of CalculiX have 9 points, here they are integrated in full: 0.7 percent."""
+    facets = PLATE[1] if kind == "S8" else triangles(PLATE[1], 6)
+    deck, moved, _ = solved(tmp_path, text_of(PLATE[0], {kind: facets}, CLAMPED, "*DLOAD\nALL, P, 1."))
+    assert moved[TIP][2] == pytest.approx(sag, rel=2e-5 if kind == "S8" else 0.01)
+    assert bool(deck.notes) == (kind == "S6")
+
+
+@pytest.mark.parametrize("kind", ["S4", "S4R", "S3"])
+def test_linear_shells_get_midpoints_and_bend_as_quadratic_ones(kind: str, tmp_path: Path) -> None:
+    """CalculiX's own have 0.2875, 3.0329 and 0.1713 for the 0.2772 of S8R."""
+    facets = triangles(PLATE[1], 3) if kind == "S3" else PLATE[1][:, :4]
+    deck, moved, reaction = solved(tmp_path, text_of(PLATE[0], {kind: facets}, CLAMPED, "*DLOAD\nALL, P, 1."))
+    assert moved[TIP][2] == pytest.approx(2.772039e-01, rel=0.02 if kind == "S3" else 2e-5)
+    np.testing.assert_allclose(reaction, (0, 0, -800), atol=1e-6)
+    assert any(f"{kind} get nodes in the middle of their edges" in note for note in deck.notes)
+    assert sorted(moved) == np.unique(facets).tolist()
+
+
+def two_planes(beyond: float) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
+    """A wall, 100 high, with a flange on top from -beyond to 100; points, facets, points of the flange."""
+    wall = grid(10, 4, lambda w: w @ np.array([[0, 0, 100.0], [0, 40.0, 0]]))
+    ahead = 15 if beyond else 10
+    flange = grid(
+        ahead, 4, lambda w: w @ np.array([[100.0 + beyond, 0, 0], [0, 40.0, 0]]) - [beyond, 0, -100]
+    )
+    points, facets = np.vstack([wall[0], flange[0]]), np.vstack([wall[1], flange[1] + len(wall[0])])
+    _, first, number = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
+    return points, {"S8R": first[number.ravel()][facets]}, np.flatnonzero(np.isclose(points[:, 2], 100))
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    ("beyond", "direction", "calculix"),
+    [(0.0, 3, 0.2710347), (0.0, 2, 0.1263392), (50.0, 3, 0.2707641), (50.0, 2, 0.1232291)],
+)
+def test_shells_that_meet_at_right_angles_are_joined_as_by_knots(
+    beyond, direction, calculix, tmp_path
+) -> None:
+    points, facets, _ = two_planes(beyond)
+    root, tip = np.flatnonzero(points[:, 2] == 0), np.flatnonzero(points[:, 0] == 100)
+    loads = "*CLOAD\n" + "\n".join(f"{k + 1}, {direction}, 1." for k in tip if k in facets["S8R"])
+    _, moved, reaction = solved(tmp_path, text_of(points, facets, [(root, "1, 6")], loads))
+    corner = next(k for k in tip if k in moved)
+    assert moved[corner][direction - 1] == pytest.approx(calculix, rel=2e-5)
+    assert reaction[direction - 1] == pytest.approx(-9.0, rel=1e-6)
+
+
+def test_a_knot_is_held_and_loaded_as_one_piece(tmp_path: Path) -> None:
+    points, facets, above = two_planes(0.0)
+    root, tip = np.flatnonzero(points[:, 2] == 0), np.flatnonzero(points[:, 0] == 100)
+    used = np.unique(facets["S8R"])
+    knots = np.intersect1d(above[points[above, 0] == 0], used)
+    loads = "*CLOAD\n" + "\n".join(f"{k + 1}, 3, 1." for k in tip if k in used)
+    loads += f"\n{knots[0] + 1}, 5, 100.\n{knots[1] + 1}, 1, 3."
+    text = text_of(points, facets, [(root, "1, 6"), (knots, "2, 2")], loads)
+    _, _, reaction = solved(tmp_path, text)
+    np.testing.assert_allclose(reaction, (-3, 0, -9), atol=1e-7)
+    with pytest.raises(DeckError, match=r"shells meet in a knot at node \d+, .*leave NLGEOM out"):
+        solved(tmp_path, text.replace("*STEP", "*STEP, NLGEOM"))
+
+
+def cylinder(side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """An eighth of a cylinder of radius 300 and length 600."""
+
+    def place(w: np.ndarray) -> np.ndarray:
+        turn = np.pi / 2 * w[:, 0]
+        return np.column_stack([300 * np.sin(turn), 300 * w[:, 1], 300 * np.cos(turn)])
+
+    points, facets, at = grid(side, side, place)
+    return points, facets[:, [0, 3, 2, 1, 7, 6, 5, 4]], at
+
+
+def test_a_pinched_cylinder_has_the_deflection_of_calculix(tmp_path: Path) -> None:
+    points, facets, at = cylinder(8)
+    left, right, end, middle = (np.flatnonzero(at[:, k] == v) for k in (0, 1) for v in (0, 1))
+    flat = at[middle, 0] <= 0.5
+    held = [(end, "1, 1"), (end, "3, 3"), (left, "1, 1"), (left, "5, 5"), (middle, "2, 2")]
+    held += [(middle[flat], "4, 4"), (middle[~flat], "6, 6"), (right, "3, 3"), (right, "5, 5")]
+    loads = f"*CLOAD\n{node_at(at, 0, 1) + 1}, 3, -0.25"
+    text = text_of(points, {"S8R": facets}, held, loads, thick=3.0, law="3e6, 0.3")
+    _, moved, reaction = solved(tmp_path, text)
+    assert moved[node_at(at, 0, 1)][2] == pytest.approx(-1.773729e-05, rel=1e-5)
+    assert reaction[2] == pytest.approx(0.25, rel=1e-6)
+
+
+def test_rotations_about_normals_are_left_free(tmp_path: Path) -> None:
+    """Held together, rotations 4 and 6 of a curved edge make CalculiX 2.20 give 0.13 of the deflection."""
+    top = np.radians(40)
+    points, facets, at = grid(
+        8,
+        8,
+        lambda w: np.column_stack([25 * np.sin(top * w[:, 0]), 25 * w[:, 1], 25 * np.cos(top * w[:, 0])]),
+    )
+    left, _, end, middle = (np.flatnonzero(at[:, k] == v) for k in (0, 1) for v in (0, 1))
+    held = [(end, "1, 1"), (end, "3, 3"), (left, "1, 1"), (left, "5, 5"), (middle, "2, 2"), (middle, "4, 4")]
+    weight = "*DLOAD\nALL, GRAV, 360., 0., 0., -1."
+    for more in ([], [(middle, "6, 6")]):
+        turned = facets[:, [0, 3, 2, 1, 7, 6, 5, 4]]
+        text = text_of(points, {"S8R": turned}, held + more, weight, thick=0.25, law="4.32e8, 0.")
+        deck, moved, _ = solved(tmp_path, text)
+        assert moved[node_at(at, 1, 1)][2] == pytest.approx(-0.3019568, rel=1e-5)
+        assert any("rotations about the normals" in note for note in deck.notes) == bool(more)
+
+
+def test_shells_that_face_opposite_ways_are_one_plate(tmp_path: Path) -> None:
+    facets = PLATE[1].copy()
+    facets[::2] = facets[::2][:, [0, 3, 2, 1, 7, 6, 5, 4]]
+    loads = f"*CLOAD\n{TIP + 1}, 3, 1000."
+    deck, moved, _ = solved(tmp_path, text_of(PLATE[0], {"S8R": facets}, CLAMPED, loads))
+    assert list(deck.scene.bodies) == ["ALL"]
+    assert moved[TIP][2] == pytest.approx(9.475214e-01, rel=1e-6)
+
+
+def test_thickness_of_nodes_and_steps_of_thickness(tmp_path: Path) -> None:
+    """Of two plates, one after the other, the thinner one bends more; their middles are in one plane."""
+    load = f"*CLOAD\n{TIP + 1}, 3, 1000."
+    thick = "*NODAL THICKNESS\nNALL, 4."
+    text = text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, load, ", NODAL THICKNESS", model=thick)
+    _, moved, _ = solved(tmp_path, text)
+    assert moved[TIP][2] == pytest.approx(9.475214e-01, rel=1e-6)
+    inner = "*ELSET, ELSET=END\n5, 6, 7, 8\n*SHELL SECTION, ELSET=END, MATERIAL=M\n2."
+    deck, moved, _ = solved(tmp_path, text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, load, model=inner))
+    assert len(deck.scene.bodies) == 2
+    assert moved[TIP][2] == pytest.approx(THINNER, rel=1e-4)
+
+
+#: What CalculiX prints where the outer half of the plate is 2 thick.
+THINNER = 1.775730
+
+
+def test_local_axes_and_reactions_of_hinged_nodes(tmp_path: Path) -> None:
+    """Held along turned axes by all of three, or along x, y and z: the same."""
+    found = []
+    for model in ("", "*TRANSFORM, NSET=NALL\n1., 1., 0., -1., 1., 0."):
+        text = text_of(PLATE[0], {"S8R": PLATE[1]}, HINGED, "*DLOAD\nALL, P, 1.", model=model)
+        text = text.replace("NSET=NALL, TOTALS=ONLY", "NSET=NALL, TOTALS=YES")
+        (tmp_path / "shell.inp").write_text(text)
+        deck = read_deck(tmp_path / "shell.inp")
+        state = deck.solve(MPI.COMM_WORLD, tolerance=1e-10)[-1]
+        moved, reaction = deck.tables(state)
+        found.append(moved.rows)
+        held = {int(row[0]) - 1 for row in reaction.rows[:-1] if np.abs(row[1:]).max() > 1e-3}
+        assert held <= set(FIXED.tolist()) | set(FREE.tolist())
+        np.testing.assert_allclose(reaction.rows[-1, 1:], (0, 0, -800), atol=1e-6)
+    np.testing.assert_allclose(found[0], found[1], atol=1e-8)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_sides_of_shells_touch_and_are_pressed(tmp_path: Path) -> None:
+    """Two clamped plates, one on the other: the pressed one hands half of the load on."""
+    points = np.vstack([PLATE[0], PLATE[0] + [0, 0, -4.0]])
+    facets = {"S8R": np.vstack([PLATE[1], PLATE[1] + len(PLATE[0])])}
+    held = [(np.concatenate([FIXED, FREE, FIXED + len(PLATE[0]), FREE + len(PLATE[0])]), "1, 6")]
+    model = "*ELSET, ELSET=UP, GENERATE\n1, 8\n*ELSET, ELSET=LOW, GENERATE\n9, 16\n"
+    model += "*SURFACE, NAME=SU\nUP, SNEG\n*SURFACE, NAME=SL\nLOW, SPOS\n"
+    model += "*CONTACT PAIR, INTERACTION=I, TYPE=SURFACE TO SURFACE\nSU, SL\n"
+    model += "*SURFACE INTERACTION, NAME=I\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD"
+    loads = "*DLOAD\nUP, P2, 1."
+    text = text_of(points, facets, held, loads, model=model)
+    path = tmp_path / "shell.inp"
+    path.write_text(text)
+    deck = read_deck(path)
+    state = deck.solve(MPI.COMM_WORLD)[-1]
+    assert np.median(state.contact.pressure) == pytest.approx(0.5, abs=0.1)
+    moved = {int(row[0]) - 1: row[1:] for row in deck.tables(state)[0].rows}
+    assert moved[MIDDLE][2] == pytest.approx(moved[MIDDLE + len(PLATE[0])][2], rel=0.02)
+    assert moved[MIDDLE][2] < 0
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_shells_hang_on_solids_at_the_nodes_of_these(tmp_path: Path) -> None:
+    """A plate between two blocks: their nodes move it, as hinges, and carry its weight."""
+    text = text_of(PLATE[0], {"S8R": PLATE[1]}, [], "*DLOAD\nALL, GRAV, 10., 0., 0., -1.")
+    root = PLATE[1][PLATE[2][PLATE[1][:, 0], 0] == 0]
+    lines, number = [], 1000
+    for at, facets in ((-10.0, root[:, [0, 3]]),):
+        below = np.unique(facets)
+        extra = {}
+        for k in below:
+            for shift in ((at, 0), (at, -10.0), (0.0, -10.0)):
+                number += 1
+                extra[k, shift] = number
+                x, y, z = PLATE[0][k] + [shift[0], 0, shift[1]]
+                lines.append(f"{number}, {x}, {y}, {z}")
+        lines.append("*ELEMENT, TYPE=C3D8, ELSET=BLOCK")
+        for place, (a, b) in enumerate(facets):
+            ring = [(extra[k, (at, -10.0)], extra[k, (0.0, -10.0)], k + 1, extra[k, (at, 0)]) for k in (a, b)]
+            lines.append(f"{900 + place}, " + ", ".join(map(str, [*ring[1], *ring[0]])))
+    solid = "*NODE\n" + "\n".join(lines) + "\n*SOLID SECTION, ELSET=BLOCK, MATERIAL=M\n"
+    held = "*NSET, NSET=FOOT\n" + "\n".join(str(n) for n in extra.values()) + "\n*BOUNDARY\nFOOT, 1, 3\n"
+    held += "\n".join(f"{k + 1}, 3" for k in FREE if k in PLATE[1]) + "\n"
+    text = text.replace("*STEP", solid + held + "*STEP").replace("*BOUNDARY\n*NODE", "*NODE")
+    _, moved, reaction = solved(
+        tmp_path,
+        text.replace("NALL, TOTALS", "EVERY, TOTALS").replace(
+            "*STEP", "*NSET, NSET=EVERY\nNALL, FOOT\n*STEP"
+        ),
+    )
+    np.testing.assert_allclose(reaction, (0, 0, 32000), rtol=1e-6, atol=1e-5)
+    assert moved[MIDDLE][2] < -1.0
+
+
+PRESSED = text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("\n4.0\n", "\n0.\n", r"the thickness must be above zero, got 0: give it"),
+        ("\n4.0\n", "\n", r"the thickness must be above zero, got none: give it"),
+        ("*SHELL SECTION, ELSET=ALL, MATERIAL=M\n4.0\n", "", r"element 1 has no \*SHELL SECTION"),
+        ("*SHELL SECTION", "*SOLID SECTION", r"element 1 has no \*SHELL SECTION"),
+        ("MATERIAL=M\n4.0", "MATERIAL=M, NODAL THICKNESS\n4.0", r"node \d+ has no \*NODAL THICKNESS"),
+        ("MATERIAL=M\n4.0", "MATERIAL=M, COMPOSITE\n4.0", r"the parameter COMPOSITE is not read"),
+        ("ALL, P, 1.", "ALL, P9, 1.", r"C3D20R has 6 faces, got 'P9'"),
+        ("*DLOAD", "*CLOAD\n43, 6, 1.\n*DLOAD", r"node 43 has a moment about the normal of its shell"),
+        ("*STEP\n", "*BOUNDARY\n43, 6, 6, 0.1\n*STEP\n", r"a rotation about the normal of a shell cannot"),
+        ("*DLOAD", "*BOUNDARY\n43, 3\n*DLOAD", ""),
+        (
+            "*END STEP\n",
+            "*END STEP\n*STEP\n*STATIC\n*BOUNDARY\n43, 3\n*END STEP\n",
+            r"held alike in all steps",
+        ),
+        (
+            "*STEP\n",
+            "*RIGID BODY, ELSET=ALL, REF NODE=43\n*STEP\n",
+            r"node 43 of a shell also drives a surface",
+        ),
+        ("*STATIC", "*STATIC\n*CLOAD\n43, 5, 1.", ""),
+    ],
+)
+def test_mistakes_about_shells_are_refused_at_their_lines(old: str, new: str, message: str, tmp_path) -> None:
+    path = tmp_path / "shell.inp"
+    path.write_text(PRESSED.replace(old, new, 1))
+    if not message:
+        read_deck(path)
+        path.write_text(path.read_text().replace("*STEP\n", "*STEP, NLGEOM\n", 1))
+        message = "with NLGEOM rotations and moments of nodes of shells" if "43, 5" in new else ""
+    if message:
+        with pytest.raises(DeckError, match=rf"shell.inp, line \d+: .*{message}"):
+            read_deck(path)
+    else:
+        assert read_deck(path).scene.bodies
