@@ -79,6 +79,20 @@ DECKS: Mapping[str, str] = {
         "*ELASTIC\n210000., 0.", "*ELASTIC, TYPE=ORTHO\n2., 1., 3., 1., 1., 4., 1., 2.,\n3.", 1
     ) + "*ORIENTATION, NAME=O\n1., 0., 0., 0., 1., 0.\n" + parts.FIXED
     + parts.step("*CLOAD\nBAR_X1, 1, 3.\n"),
+    "distribution": parts.PLAIN_BAR.replace(
+        "*ELASTIC\n210000., 0.", "*ELASTIC, TYPE=ORTHO\n2., 1., 3., 1., 1., 4., 1., 2.,\n3.", 1
+    ).replace("MATERIAL=STEEL\n*", "MATERIAL=STEEL, ORIENTATION=O\n*")
+    + "*PARAMETER\nhalf = 2*1.5\n*DISTRIBUTION, NAME=D\n, 1., 0., 0., 0., 1., 0.\n2, 0., 0., 1., 0., 1., 0.\n"
+    "*ORIENTATION, NAME=O\nD\n3, 30.\n" + parts.FIXED + parts.step("*CLOAD\nBAR_X1, 1, <half>\n"),
+    "single": _MODEL + "*ORIENTATION, NAME=O, SYSTEM=CYLINDRICAL\n0., 0.5, 0.5, 1., 0.5, 0.5\n"
+    + parts.KINEMATIC.replace("1, 6", "1, 2").replace("COUPLING,", "COUPLING, ORIENTATION=O,")
+    + "*EQUATION\n3\n502, 1, 1., 501, 2, 1., 9, 1, -0.5\n2\nBAR_X1, 3, 1., 17, 3, -1.\n"
+    + parts.step("*CLOAD\n501, 2, 3.\n502, 1, 7.\n"),
+    "springs": _MODEL + "*ELEMENT, TYPE=SPRINGA, ELSET=S\n101, 17, 18\n*ELEMENT, TYPE=T3D2, ELSET=T\n"
+    "102, 19, 9\n*ELEMENT, TYPE=SPRING1, ELSET=ONE\n103, 20\n*SPRING, ELSET=ONE\n2\n5.\n"
+    "*SPRING, ELSET=S, NONLINEAR\n0., 0.\n30., 1.\n*SOLID SECTION, ELSET=T, MATERIAL=STEEL\n0.3\n"
+    "*ELEMENT, TYPE=MASS, ELSET=M\n104, 12\n*MASS, ELSET=M\n2.\n*ELSET, ELSET=ALL\nS, 102, 1\n"
+    + parts.FIXED + parts.step("*DLOAD\nM, GRAV, 9., 1., 0., 0.\n"),
 }  # fmt: skip
 
 _CUBE = """title = "a cube"
