@@ -582,6 +582,9 @@ def _check_single_faces(card: Card, mesh: DeckMesh) -> None:
 
 def _temperatures(card: Card, mesh: DeckMesh) -> Iterator[tuple[np.ndarray, Any]]:
     """Yield nodes of a card and their temperatures."""
+    if "LINTEMP" in card.parameters:
+        yield from (_between_planes(card, row, mesh) for row in range(len(card.lines)))
+        return
     table = card.numbers_alone
     if table.shape[1] > 1:
         yield mesh.positions(card.wholes(table[:, 0]), "node", card, by_row=True), table[:, 1]
@@ -591,6 +594,18 @@ def _temperatures(card: Card, mesh: DeckMesh) -> Iterator[tuple[np.ndarray, Any]
         if not given:
             raise card.error("needs a node or set and its temperature: complete the line", row)
         yield mesh.nodes_named(entries[0], card, row), given[0]
+
+
+def _between_planes(card: Card, row: int, mesh: DeckMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes between two parallel planes, and their temperatures, linear between those of these."""
+    numbers = card.floats(row)
+    if len(numbers) != 7 or not any(numbers[:3]) or numbers[3] == numbers[5]:
+        raise card.error("needs a normal and two planes, each with its distance and temperature", row)
+    first, second = numbers[3:5], numbers[5:7]
+    place = mesh.points @ np.array(numbers[:3])
+    share = (place - first[0]) / (second[0] - first[0])
+    nodes = np.flatnonzero((share >= 0.0) & (share <= 1.0))
+    return nodes, first[1] + share[nodes] * (second[1] - first[1])
 
 
 def _check_span(card: Card, row: int, first: int, last: int) -> None:

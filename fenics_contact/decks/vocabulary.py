@@ -129,7 +129,7 @@ PARAMETERS: dict[str, set[str]] = {
     "CLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
     "DLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
     "DSLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
-    "TEMPERATURE": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
+    "TEMPERATURE": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "LINTEMP"},
 }
 #: Cards that change what is solved, by what they are of.
 STRUCTURES = {

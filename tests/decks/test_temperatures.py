@@ -94,3 +94,19 @@ HOT = step("*TEMPERATURE\nALL, 220.\n")
 def test_what_cannot_follow_the_temperature_is_refused(text: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(DeckError, match=message):
         read_deck(deck(tmp_path, text))
+
+
+def test_temperatures_may_be_linear_between_planes(tmp_path: Path) -> None:
+    """100, 200, 300 and 100 at the nodes along the bar, whose cells end there."""
+    lines = "*TEMPERATURE, LINTEMP\n1., 0., 0., 0., 100., 2., 300.\n1., 0., 0., 2., 300., 3., 100.\n"
+    text = BAR.replace("0.3\n", "0.\n*EXPANSION\n1.E-5\n") + FREE_TO_CONTRACT
+    found = read_deck(deck(tmp_path, text + step(lines)))
+    (heat,) = found.steps[0].loads
+    assert isinstance(heat, ThermalStrain)
+    assert isinstance(heat.temperature_change, NodeValues)
+    along = heat.temperature_change.points[:, 0]
+    wanted = np.array([100.0, 200.0, 300.0, 100.0])[along.astype(int)]
+    np.testing.assert_allclose(heat.temperature_change.values, wanted)
+    assert set(along) == {0.0, 1.0, 2.0, 3.0}
+    with pytest.raises(DeckError, match="needs a normal and two planes"):
+        read_deck(deck(tmp_path, text + step(lines.replace(", 3., 100.", ", 2., 100."))))
