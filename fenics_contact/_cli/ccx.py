@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import typer
 
@@ -16,8 +17,6 @@ from fenics_contact.decks.job import Increment, run_job
 from fenics_contact.errors import FenicsContactError, InvalidInputError
 from fenics_contact.output.result import own_version
 
-#: Exit code of CalculiX without a job.
-NO_JOB = 201
 #: Front ends look for its name and, in what -v prints, for a version.
 USAGE = "Usage: fenics-contact ccx -i jobname (reads and writes the files of CalculiX, job.inp and job.frd)"
 
@@ -38,6 +37,9 @@ class Arguments:
 
     job: str = ""
     version: bool = False
+
+    #: Exit code of CalculiX without a job.
+    no_job: ClassVar[int] = 201
 
     @classmethod
     def of(cls, given: Sequence[str]) -> Arguments:
@@ -75,7 +77,7 @@ def ccx(context: typer.Context) -> None:
             return
         if not arguments.job:
             console.write(USAGE)
-            raise typer.Exit(NO_JOB)
+            raise typer.Exit(Arguments.no_job)
         _solve(console, Path(f"{arguments.job}.inp"))
 
 

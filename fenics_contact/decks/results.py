@@ -269,7 +269,7 @@ def points_of(element: Element, collapses: bool) -> tuple[np.ndarray, int]:
     gauss = 0.5 + 0.5 * np.polynomial.legendre.leggauss(2 if linear or element.variant == "R" else 3)[0]
     if count in {3: (8, 20), 2: (4, 8)}[dim]:
         grid = np.meshgrid(*[gauss] * dim, indexing="ij")
-        return np.stack([each.ravel() for each in grid[::-1]], axis=1), len(gauss)
+        return np.stack([each.ravel() for each in grid[::-1]], axis=1), len(gauss) if dim == 2 else 1
     if (dim, count) in ((3, 4), (3, 10)):
         near, far = (0.25, 0.25) if count == 4 else (0.58541019662496852, 0.13819660112501051)
         simplex = np.full((4, 3), far) + np.vstack([np.zeros(3), np.eye(3)]) * (near - far)

@@ -15,13 +15,15 @@ from fenics_contact import clean_environment
 from fenics_contact.decks import DeckError, Increment, run_job
 from fenics_contact.decks.results import exponential, points_of
 from fenics_contact.errors import InfeasibleError
+from fenics_contact.gallery import block as block_of
+from fenics_contact.mesh import quadratic
 from fenics_contact.output import OutputError
 from fenics_contact.readers.deck_elements import Element
 from tests.decks.single import TWO_BLOCKS, single
-from tests.decks.texts import PLAIN_BAR, deck, step
+from tests.decks.texts import BLOCKS, FIXED, PLAIN_BAR, SECTION, STEEL, deck, mesh_cards, step
 from tests.frd_files import read_frd
 
-HELD = PLAIN_BAR + "*BOUNDARY\nBAR_X0, 1, 3\n"
+HELD = PLAIN_BAR + FIXED
 
 
 def job(path: Path) -> list[str]:
@@ -64,6 +66,7 @@ def test_one_hexahedron_has_the_fields_of_calculix(tmp_path: Path) -> None:
         line = printed[start + 2 + point]
         assert line[:15] == f"         7 {point + 1:3d} "
         assert row(line)[2:] == pytest.approx(values, rel=2e-5)
+    assert [printed[start + 2 + 27], len(printed)] == ["", start + 2 + 27 + 3 + 27]
     total = printed.index(" total force (fx,fy,fz) for set NALL and time  0.1000000E+01")
     assert row(printed[total + 2]) == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
 
@@ -82,6 +85,7 @@ def test_stresses_are_printed_at_the_points_of_calculix(
     (start,) = [k for k, line in enumerate(printed) if line.startswith(" stresses")]
     rows = [row(line) for line in printed[start + 2 : start + 2 + points]]
     assert [(int(each[0]), int(each[1])) for each in rows] == [(7, k + 1) for k in range(points)]
+    assert printed[start + 2 + points] == ""
     for point, theirs in values.items():
         assert rows[point - 1][2:5] == pytest.approx(theirs, rel=2e-5)
 
@@ -236,23 +240,52 @@ def test_two_ranks_write_the_same_files(tmp_path: Path, mpirun: Callable[..., st
 
 
 SINGLE = ("C3D20", "C3D8", "C3D10", "C3D4", "CPE4", "CPE8R", "CPE6", "CPS3", "CAX8R", "CAX4")
+OUTPUT = "*NODE FILE\nU, RF\n*EL FILE\nS, E\n"
+COLD = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 20.\n"
+HEAT = "*EXPANSION\n1.2e-5\n"
+
+
+def beam(cards: str, element: str = "", more: str = "", material: str = "") -> str:
+    """A beam of 4 by 2 by 2 cells that is held at one end."""
+    mesh = block_of((0, 0, 0), (4, 1, 1), (4, 2, 2))
+    text = mesh_cards({"BAR": quadratic(mesh) if element else mesh}, element) + STEEL + material + SECTION
+    return text.replace("*NODE\n", "*NODE, NSET=ALL\n", 1) + FIXED + COLD + step(cards + OUTPUT, more)
+
+
+DECKS = {
+    "reduced": beam("*DLOAD\n13, P4, -3.\n14, P4, -3.\n16, P4, 3.\n", "C3D20R"),
+    "full": beam("*DLOAD\n13, P4, -3.\n14, P4, -3.\n16, P4, 3.\n", "C3D20"),
+    "weight": beam("*DLOAD\nBAR, GRAV, 9810., 0., 0., -1.\n", material="*DENSITY\n7.8e-9\n"),
+    "bent": beam("*BOUNDARY\nBAR_X1, 2, 2, 0.5\n", "C3D20R", ", NLGEOM"),
+    "hot": beam("*TEMPERATURE\nALL, 120.\n", material=HEAT),
+    "hot, quadratic": beam("*TEMPERATURE\nALL, 120.\n", "C3D20", material=HEAT),
+    "hot, large": beam("*TEMPERATURE\nALL, 120.\n", more=", NLGEOM", material=HEAT),
+    "tied": BLOCKS + "*TIE, NAME=T\nFEET, TABLE\n" + step("*DLOAD\nUP, P2, 42.\n" + OUTPUT),
+    "contact": TWO_BLOCKS,
+}
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
-@pytest.mark.parametrize("kind", SINGLE)
+@pytest.mark.parametrize("kind", [*SINGLE, *DECKS])
 def test_files_of_both_programs_agree(kind: str, tmp_path: Path) -> None:
-    path = single(tmp_path, kind)
-    subprocess.run(["ccx", kind], cwd=tmp_path, check=True, env=clean_environment(), capture_output=True)
+    path = deck(tmp_path, DECKS[kind], "job.inp") if kind in DECKS else single(tmp_path, kind)
+    command = ["ccx", path.stem]
+    subprocess.run(command, cwd=tmp_path, check=True, env=clean_environment(), capture_output=True)
     theirs = read_frd(path.with_suffix(".frd"))
     job(path)
     ours = read_frd(path.with_suffix(".frd"))
     assert (ours.cells, list(ours.nodes)) == (theirs.cells, list(theirs.nodes))
-    for kind_of in ("DISP", "STRESS", "TOSTRAIN", "FORC"):
-        one, other = (each.block(kind_of).at(list(ours.nodes)) for each in (ours, theirs))
-        if kind_of == "FORC" and kind.startswith("CAX"):  # radial ones do not balance there
+    for block in ours.blocks:
+        known = theirs.block(block.kind, block.time)
+        nodes = list(known.values)
+        one, other = block.at(nodes), known.at(nodes)
+        if block.kind == "FORC" and kind.startswith("CAX"):  # radial ones do not balance there
             one, other = one[:, 1:], other[:, 1:]
-        assert np.abs(one - other).max() <= 2e-4 * np.abs(other).max(), kind_of
+        if block.kind == "CONTACT":  # surfaces that give way are softer there, see above
+            one, other = one[:, 1:], other[:, 1:]
+        scale = np.abs(other).max()
+        assert np.abs(one - other).max() <= (2e-3 if kind == "contact" else 3e-4) * scale, block.kind
 
 
 @pytest.mark.slow

@@ -95,7 +95,10 @@ def test_strains_of_large_deformations_are_greens(tmp_path: Path) -> None:
 
 def test_several_states_have_their_times(tmp_path: Path) -> None:
     state = solved()
-    found = read_frd(write_frd(tmp_path / "steps.frd", [state, state], times=[0.5, 12.0]))
+    path = write_frd(tmp_path / "steps.frd", [state, state], times=[0.5, 12.0])
+    heads = [line[7:24] for line in path.read_text().splitlines() if line.startswith("  100CL")]
+    assert (heads[0], heads[-1]) == ("  101 5.00000E-01", "  102 12.00000000")  # as CalculiX has them
+    found = read_frd(path)
     assert [(each.time, each.step) for each in found.blocks[::5]] == [(0.5, 1), (12.0, 2)]
     with pytest.raises(InvalidInputError, match="times must have one for each of 2 states, got 1"):
         write_frd(tmp_path / "steps.frd", [state, state], times=[0.5])

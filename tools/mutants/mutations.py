@@ -167,6 +167,20 @@ MUTATIONS = (
         ),
     ),
     Mutation(
+        "files of CalculiX list the nodes of quadratic hexahedra as decks do",
+        "output/frd.py",
+        "4: [*range(12), *range(16, 20), *range(12, 16)]",
+        "4: [*range(20)]",
+        ("tests/decks/test_job.py::test_one_hexahedron_has_the_fields_of_calculix",),
+    ),
+    Mutation(
+        "forces at nodes contain what contact exerts",
+        "results/state.py",
+        "- rows - torn.points.on_nodes(forces.contact)",
+        "- rows",
+        ("tests/output/test_frd.py::test_uniform_pressure_is_exact_in_all_fields",),
+    ),
+    Mutation(
         "the moment of a force beside its surface is forgotten",
         "_fem/loads.py",
         "moment = lever + (",
