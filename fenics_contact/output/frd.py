@@ -315,7 +315,7 @@ def _on_nodes(state: State, numbering: BodyNumbers) -> dict[str, np.ndarray]:
     for name, body in state.scene.deforming.items():
         at = state.gather_at_points(name)
         for kind, values in parts.items():
-            total, count = at.at_nodes(getattr(at, kind), body.mesh.cells, body.mesh.n_nodes)
+            total, count = at.at_nodes(getattr(at, kind), body.mesh)
             values[name] = np.stack([total[:, i - 1, j - 1] for i, j in FrdField.tensor], axis=1)
             counts[name] = count[:, None]
     count = np.maximum(numbering.summed(counts), 1.0)

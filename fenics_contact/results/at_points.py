@@ -22,8 +22,9 @@ from fenics_contact._scene.body import Body
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlinear
+from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CellType, quadrature, shape_gradients, shape_values
-from fenics_contact.mesh.collapsed import as_hexahedra, places_of
+from fenics_contact.mesh.collapsed import as_hexahedra, by_shape, collapse, places_of
 from fenics_contact.mesh.quality import determinants
 from fenics_contact.results.fields import CellStress, cells_of_body, tensors
 
@@ -66,7 +67,7 @@ class PointFields:
             _monomials(self._cell, count, self.positions)
         )
 
-    def at_nodes(self, values: np.ndarray, cells: np.ndarray, n_nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    def at_nodes(self, values: np.ndarray, mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray]:
         """Return values at nodes: those of each cell extrapolated to its nodes, then the mean over cells.
 
         As CalculiX does: 8 Gauss points by the trilinear function that they determine, 27 by the triquadratic
@@ -74,17 +75,26 @@ class PointFields:
 
         Args:
             values: At the points, shape (n_cells, n_points, ...).
-            cells: Nodes of the cells, shape (n_cells, nodes of a cell).
-            n_nodes: Number of nodes.
+            mesh: The body's mesh.
 
         Returns:
             Sums over cells, and numbers of cells, shapes (n_nodes, ...) and (n_nodes,).
         """
-        own = np.tensordot(values, self.to(self._cell.nodes), axes=(1, 1))  # (n_cells, ..., nodes)
-        flat = np.moveaxis(own, -1, 1).reshape(cells.size, -1)
-        total = [np.bincount(cells.ravel(), column, minlength=n_nodes) for column in flat.T]
-        count = np.bincount(cells.ravel(), minlength=n_nodes).astype(np.float64)
-        return np.stack(total, axis=1).reshape(n_nodes, *values.shape[2:]), count
+        matrix, flat = self.to(self._cell.nodes), values.reshape(*values.shape[:2], -1)
+        total, count = np.zeros((mesh.n_nodes, flat.shape[2])), np.zeros(mesh.n_nodes)
+        for name, (mine, nodes) in by_shape(mesh.cells, mesh.dim).items():
+            own = _own_places(name, mesh.order) @ matrix if self.collapses else matrix
+            found = np.einsum("kq,cqi->cki", own, flat[mine]).reshape(nodes.size, -1)
+            parts = [np.bincount(nodes.ravel(), column, minlength=mesh.n_nodes) for column in found.T]
+            total += np.stack(parts, axis=1)
+            count += np.bincount(nodes.ravel(), minlength=mesh.n_nodes)
+        return total.reshape(mesh.n_nodes, *values.shape[2:]), count
+
+
+def _own_places(name: str, order: int) -> np.ndarray:
+    """Return the matrix of means over the places in the hexahedron where each node of a shape is."""
+    there = np.isclose(collapse(name, order).values, 1.0).T
+    return np.asarray(there / there.sum(axis=1, keepdims=True))
 
 
 def _monomials(cell: CellType, count: int, places: np.ndarray) -> np.ndarray:
@@ -210,28 +220,23 @@ def _put_history(torn: TornSystem, name: str, stress: np.ndarray, responses: Seq
     stress[count > 0.0] = total[count > 0.0]
 
 
-def stress_at_rest(torn: TornSystem, name: str, mesh: _dolfinx.mesh.Mesh) -> np.ndarray:
-    """Return the stress of a body that does not move, (n_cells, n_points, 3, 3). Collective.
+def forces_at_rest(torn: TornSystem, name: str, mesh: _dolfinx.mesh.Mesh) -> np.ndarray:
+    """Return ∫ σ : ∇v of the stress of a body at rest, by node, (n_nodes, dim), [force]. Collective.
 
-    Initial stress less what heat would take to be held back; of nonlinear materials none.
+    Initial stress less what heat would take to be held back; without any, and of nonlinear materials, zero.
+    `mesh`: that of the body.
     """
     body, comm = torn.scene.bodies[name], torn.decomposition.comm
     temperature = temperature_of(torn.scene.loads, name)
-    count = len(quadrature(body.element.cell, quadrature_degree(body.element))[0])
     if not (temperature.loads or temperature.initial) or any(map(is_nonlinear, body.materials)):
-        return np.zeros((body.mesh.n_cells, count, 3, 3))
-    return _gathered(PointStress(mesh, body, comm, temperature), _dolfinx.coefficient(mesh, "u"), body, count)
-
-
-def internal_forces(body: Body, stress: np.ndarray) -> np.ndarray:
-    """Return ∫ σ : ∇v of a stress at the points of undeformed cells, by node, (n_nodes, dim), [force]."""
-    mesh, (cells, apart) = body.mesh, body.mesh.apart
-    points = _Points(body, np.zeros_like(mesh.points))
-    nodal = points.gradients.force(points.weights, stress)
-    count = int(cells.max()) + 1
-    force = np.stack(
-        [np.bincount(cells.ravel(), each.ravel(), count) for each in np.moveaxis(nodal, 2, 0)], 1
-    )
+        return np.zeros_like(body.mesh.points)
+    points = _Points(body, np.zeros_like(body.mesh.points))
+    at, rest = PointStress(mesh, body, comm, temperature), _dolfinx.coefficient(mesh, "u")
+    nodal = points.gradients.force(points.weights, _gathered(at, rest, body, len(points.positions)))
+    cells, apart = body.mesh.apart
+    columns, count = np.moveaxis(nodal, 2, 0), int(cells.max()) + 1
+    force = np.stack([np.bincount(cells.ravel(), each.ravel(), count) for each in columns], axis=1)
     force = force if apart is None else np.asarray(apart.T @ force)
-    padded = np.pad(force, ((0, mesh.n_nodes - len(force)), (0, 0)))
-    return np.asarray(mesh.followers.followed(mesh.n_nodes).T @ padded) if mesh.followers else padded
+    force = np.pad(force, ((0, body.mesh.n_nodes - len(force)), (0, 0)))
+    followers = body.mesh.followers
+    return np.asarray(followers.followed(len(force)).T @ force) if followers else force

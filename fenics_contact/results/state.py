@@ -502,13 +502,13 @@ class State(ABC):
 
     @cached_property
     def _internal_forces(self) -> np.ndarray:
-        from fenics_contact.results.at_points import internal_forces, stress_at_rest
+        from fenics_contact.results.at_points import forces_at_rest
 
         torn, forces = self.torn, self._nodal_forces
         rows = nodal_sum(torn.decomposition, torn.force(self.solution.multiplier))
         at_rest = [
-            internal_forces(each, stress_at_rest(torn, name, self.displacement[name].function_space.mesh))
-            for name, each in self.scene.bodies.items()
+            forces_at_rest(torn, name, self.displacement[name].function_space.mesh)
+            for name in self.scene.bodies
         ]
         return forces.load - rows - torn.points.on_nodes(forces.contact) + np.concatenate(at_rest)
 

@@ -28,6 +28,7 @@ from fenics_contact.materials import IsotropicElasticity, StVenantKirchhoff
 from fenics_contact.mesh import quadratic
 from fenics_contact.output import write_frd
 from fenics_contact.output.frd import FrdField, contact_axes, table
+from tests.fem.mixed_cells import ORDERS, mixed_bar
 from tests.frd_files import read_frd
 
 STEEL = IsotropicElasticity(210000.0, 0.3, 1.2e-5)
@@ -68,6 +69,20 @@ def test_uniform_pressure_is_exact_in_all_fields(kind: str, code: int, cells: in
     contact = found.block("CONTACT").at(nodes)
     assert contact[low, 3].max() == pytest.approx(42.0, rel=1e-3)
     assert not contact[~low].any()
+
+
+@pytest.mark.parametrize("order", ["linear", "quadratic", "serendipity"])
+def test_stresses_that_vary_are_exact_in_all_shapes(order: str, tmp_path: Path) -> None:
+    """Quadratic cells bend exactly: σ_xx is linear across the bar, which linear cells only follow."""
+    mesh = ORDERS[order](mixed_bar())
+    bent = (lambda x: -x[:, 0] * (x[:, 2] - 0.5), 0.0, lambda x: x[:, 0] ** 2 / 2)
+    supports = [Support("bar", side, bent) for side in ("x0", "x1", "y0", "y1", "z0", "z1")]
+    scene = Scene({"bar": Body(mesh, IsotropicElasticity(1.0, 0.0))}, supports)
+    found = read_frd(write_frd(tmp_path / "bar.frd", solve_scene(scene, MPI.COMM_SELF)))
+    assert {kind for kind, _ in found.cells.values()} == ({1, 2, 3} if order == "linear" else {1, 4, 5, 6})
+    heights = np.array([place[2] for place in found.nodes.values()])
+    ours = found.block("STRESS").at(list(found.nodes))[:, 0]
+    assert np.abs(ours - (0.5 - heights)).max() < (0.3 if order == "linear" else 1e-4)
 
 
 def test_forces_leave_out_what_heat_would_take_to_be_held_back(tmp_path: Path) -> None:
