@@ -20,7 +20,18 @@ from fenics_contact.mesh import quadratic
 from fenics_contact.output import OutputError
 from fenics_contact.readers.deck_elements import Element
 from tests.decks.single import TWO_BLOCKS, single
-from tests.decks.texts import BLOCKS, FIXED, PLAIN_BAR, SECTION, STEEL, deck, mesh_cards, step
+from tests.decks.texts import (
+    BAR,
+    BLOCKS,
+    FIXED,
+    FREE_TO_CONTRACT,
+    PLAIN_BAR,
+    SECTION,
+    STEEL,
+    deck,
+    mesh_cards,
+    step,
+)
 from tests.frd_files import read_frd
 
 HELD = PLAIN_BAR + FIXED
@@ -165,6 +176,21 @@ def test_each_increment_has_a_line_of_progress(tmp_path: Path) -> None:
     assert sta[3][29:] == "  0.200000E+01  0.100000E+01  0.100000E+01"
     assert [len(line) for line in cvg[4:]] == [81, 81]
     assert int(cvg[5][24:33]) == done[1].contacts == 4
+
+
+@pytest.mark.parametrize("more", ["", ", NLGEOM"])
+def test_stresses_of_materials_with_a_history_are_those_of_their_points(more: str, tmp_path: Path) -> None:
+    """A bar is stretched far beyond its yield stress; it hardens by 100 N/mm²."""
+    plastic = BAR.replace("210000., 0.3\n", "210000., 0.3\n*PLASTIC\n200., 0.\n300., 1.\n")
+    cards = "*BOUNDARY\nBAR_X1, 1, 1, 0.03\n*EL FILE\nS\n"
+    path = deck(tmp_path, plastic + FREE_TO_CONTRACT + step(cards, more))
+    job(path)
+    (block,) = read_frd(path.with_suffix(".frd")).blocks
+    strain = np.log(1.01) if more else 0.01
+    expected = (200.0 + 100.0 * strain) / (1.0 + 100.0 / 210000.0)
+    assert np.array(list(block.values.values())) == pytest.approx(
+        np.tile([expected, 0, 0, 0, 0, 0], (len(block.values), 1)), abs=0.02
+    )
 
 
 @pytest.mark.parametrize(("number", "text"), [(0.5, "0.500E+00"), (-12.0, "-0.120E+02"), (0.0, "0.000E+00")])
