@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from fenics_contact.decks.names import Names
 from fenics_contact.decks.steps import DeckSteps
 from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.one_layer import one_wide
 from fenics_contact.mesh.quality import AT_GAUSS_POINTS, jacobians, thickness
 from fenics_contact.readers.deck_bodies import (
     Component,
@@ -109,15 +110,27 @@ def _body(deck: DeckCards, steps: DeckSteps, parts: Parts, part: Component) -> B
         thick = section.thickness if len(deck.thicknesses) > 1 else None
         given[region] = _material(deck, section, replace(of, thickness=thick))
         _note_units(deck, section.card, given[region], mesh)
-    integration = integration_of(deck.mesh, part, deck.note)
+    integration = _integration(deck, part, mesh)
     _note_corners(deck, part, mesh)
     deck.record.origins["body", part.name] = deck.sections[part.sections[0]].card.origin
     return Body(
         mesh,
         given if len(given) > 1 else next(iter(given.values())),
         axisymmetric=deck.kind == "axisymmetric",
-        integration=integration if mesh.centres else "full",
+        integration=integration,
     )
+
+
+def _integration(
+    deck: DeckCards, part: Component, mesh: BodyMesh
+) -> Literal["full", "reduced", "stabilised"]:
+    """Return how the elements of a body are integrated; rows of single cells of shells need some of full."""
+    found = integration_of(deck.mesh, part, deck.note)
+    if found == "full" or not mesh.centres:
+        return "full"
+    blocks = [deck.mesh.blocks[k] for k in np.unique(deck.mesh.block_of[part.elements])]
+    layers = any(block.element.listed < block.element.count for block in blocks)
+    return "stabilised" if layers and one_wide(mesh).any() else found
 
 
 def _temperatures(steps: DeckSteps) -> np.ndarray:

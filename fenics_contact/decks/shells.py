@@ -26,6 +26,10 @@ def on_solids(deck: DeckCards, steps: DeckSteps) -> DeckSteps:
     def held(instant: Instant) -> Instant:
         return replace(instant, held=between(instant.held))
 
+    named = any("NODALTHICKNESS" in card.parameters for card in deck.cards)
+    for card in deck.cards:
+        if card.name == "NODALTHICKNESS" and not named:
+            deck.note(card, "has no effect, as in CalculiX: no *SHELL SECTION has NODAL THICKNESS")
     for block in deck.mesh.blocks:
         if block.element.listed in (3, 4) and block.element.listed < block.element.count:
             deck.note(
@@ -58,7 +62,8 @@ class _Carrier:
         at_rest, *_ = changed = [self._instant(each) for each in (self.steps.at_rest, *self.steps.instants)]
         instants = iter(changed[1:])
         steps = [replace(step, instants=[next(instants) for _ in step.instants]) for step in self.steps.steps]
-        rows = [self._joints, *self._held_rows()]
+        none = self.motions.nodes[:0]
+        rows = [Rows.of(self.motions.joints, self._given(none, none)), *self._held_rows()]
         return replace(
             self.steps,
             steps=steps,
@@ -87,11 +92,6 @@ class _Carrier:
         return np.asarray(held & ~self._of_solids[:, None])
 
     @cached_property
-    def _clamped(self) -> np.ndarray:
-        """Which nodes are held in all components: so are all nodes across the thickness."""
-        return np.asarray(self.marks.all(axis=1))
-
-    @cached_property
     def _turned(self) -> np.ndarray:
         return self.deck.axes.turned(self.motions.nodes)
 
@@ -109,17 +109,11 @@ class _Carrier:
 
     @cached_property
     def _direct(self) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes across the thickness that are held themselves, and the numbers of their owners."""
-        shells = self.deck.mesh.shells
-        number = np.full(len(self.deck.mesh.points) + 1, -1)  # the last is that of −1
-        number[self.motions.nodes] = np.arange(len(self.motions.nodes))
-        of = number[shells.node]
-        whole = (of >= 0) & self._clamped[of]
-        middle = (of >= 0) & ~whole & self.marks[of, :3].any(axis=1)
-        middle &= ~self.motions.is_knot[of] & ~self._turned[of]
-        nodes = np.concatenate([shells.ends[whole].ravel(), shells.ends[middle, 1]])
-        owner = np.concatenate([np.repeat(of[whole], 3), of[middle]])
-        return nodes[nodes >= 0], owner[nodes >= 0]
+        """Nodes in the middle that are held themselves, and the numbers of their owners."""
+        motions = self.motions
+        held = (motions.ends[:, 1] >= 0) & self.marks[:, :3].any(axis=1)
+        owner = np.flatnonzero(held & ~motions.is_knot & ~self._turned)
+        return motions.ends[owner, 1], owner
 
     def _instant(self, instant: Instant) -> Instant:
         """Return what acts at a time."""
@@ -174,15 +168,9 @@ class _Carrier:
         nodes, components, factors = zip(*((int(n), int(c), float(f)) for n, c, f in entries), strict=True)
         return replace(equation, nodes=nodes, components=components, factors=factors)
 
-    @property
-    def _joints(self) -> Rows:
-        """The equations of knots that are not held as a whole."""
-        joints = self.motions.joints[np.flatnonzero(~self._clamped[self.motions.of_joint])]
-        return Rows.of(joints, self._given(self.motions.nodes[:0], self.motions.nodes[:0]))
-
     def _held_rows(self) -> Iterator[Rows]:
         """Yield the equations of what is held otherwise than node by node, and of hinges at solids."""
-        held = self.marks & ~self._clamped[:, None]
+        held = self.marks
         number, k = np.nonzero(held[:, :3])
         nodes, middle = self.motions.nodes[number], self.motions.ends[number, 1]
         yield Rows.of(self._local[6 * number + k], self._given(nodes, k))
@@ -244,7 +232,7 @@ class _Carrier:
     ) -> None:
         """Report held rotations about normals, and refuse those that are not zero."""
         place, way = np.nonzero(free)
-        if not len(place):
+        if not len(place) or len(components) == 3:  # held as a whole, as at a clamped edge
             return
         nodes = self.motions.nodes[number[place]]
         target = next(

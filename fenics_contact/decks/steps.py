@@ -586,11 +586,13 @@ def _temperatures(card: Card, mesh: DeckMesh) -> Iterator[tuple[np.ndarray, Any]
         yield from (_between_planes(card, row, mesh) for row in range(len(card.lines)))
         return
     table = card.numbers_alone
-    if table.shape[1] > 1:
+    if table.shape[1] > 1 and not table[:, 2:].any():
         yield mesh.positions(card.wholes(table[:, 0]), "node", card, by_row=True), table[:, 1]
         return
     for row, entries in enumerate(card.rows):
         given = card.floats(row, 1)
+        if any(given[1:]):
+            raise card.error("gradients of temperature across shells are not read: leave them out", row)
         if not given:
             raise card.error("needs a node or set and its temperature: complete the line", row)
         yield mesh.nodes_named(entries[0], card, row), given[0]
