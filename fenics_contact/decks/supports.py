@@ -133,7 +133,7 @@ class SupportBuilder:
         return [*found, *self._joints(), *self._links()]
 
     def _joints(self) -> Iterator[LinearConstraint]:
-        """Yield what joins bodies that share nodes, but no faces."""
+        """Yield what joins bodies that share nodes."""
         deck, dim = self.built.deck, self.built.deck.dim
         for first, second, nodes in self.built.parts.joints():
             terms = []
@@ -142,7 +142,7 @@ class SupportBuilder:
                 terms.append(ConstraintTerm(body, inner, np.repeat(np.eye(dim), len(nodes), axis=0), factor))
             deck.note(
                 deck.mesh.blocks[0].card,
-                f"bodies {first} and {second} share {len(nodes)} nodes, but no faces: joined",
+                f"bodies {first} and {second} share {len(nodes)} nodes: joined",
             )
             yield LinearConstraint(terms, name=f"NODES OF {first} AND {second}")
 

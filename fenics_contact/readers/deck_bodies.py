@@ -74,10 +74,15 @@ class Component:
 
 
 def components(mesh: DeckMesh, sections: Sequence[Section], of_element: np.ndarray) -> list[Component]:
-    """Return the bodies of a deck by their elements, each with a name of its own."""
+    """Return the bodies of a deck by their elements, each with a name of its own.
+
+    Elements of full and of reduced integration are bodies of their own.
+    """
     count = len(mesh.element_numbers)
     every, corners, _ = _every_face(mesh)
-    _, face = np.unique(np.sort(corners, axis=1), axis=0, return_inverse=True)
+    reduced = np.array([block.element.is_reduced for block in mesh.blocks])[mesh.block_of[every.elements]]
+    keys = np.column_stack([np.sort(corners, axis=1), reduced])
+    _, face = np.unique(keys, axis=0, return_inverse=True)
     face = face.ravel()
     size = count + int(face.max()) + 1
     graph = sp.coo_matrix((np.ones(len(face)), (every.elements, count + face)), shape=(size, size))
@@ -373,28 +378,20 @@ def _check_block(block: Block, points: np.ndarray) -> None:
         )  # fmt: skip
 
 
-#: Cells that may be integrated by fewer points.
-_REDUCED = ("hexahedron20", "quadrilateral8")
-
-
 def integration_of(
     mesh: DeckMesh, part: Component, note: Callable[[Card, str], None]
 ) -> Literal["full", "reduced"]:
-    """Return how the elements of a body are integrated, which must be alike."""
+    """Return how the elements of a body are integrated, all alike."""
     blocks = [mesh.blocks[k] for k in np.unique(mesh.block_of[part.elements])]
     for block in blocks:
         element = block.element
         if count := {"C3D6": 2, "C3D15": 9, "CAX3": 2, "CAX6": 9}.get(element.name):
             note(block.card, f"elements {element.name} are integrated in full, CalculiX takes {count} points")
-        if element.variant and (element.variant != "R" or element.cell not in _REDUCED):
+        if element.variant and not element.is_reduced:
             plain = element.name.removesuffix(element.variant)
             stiff = ", which bends too little: take quadratic ones" if element.variant == "I" else ""
             note(block.card, f"elements {element.name} are solved as {plain}, by full integration{stiff}")
-    found = {each.element.variant == "R" and each.element.cell in _REDUCED for each in blocks}
-    if len(found) > 1:
-        block = next(each for each in blocks if each.element.variant == "R")
-        raise block.card.error(f"body {part.name} has elements of full and of reduced integration: take one")
-    return "reduced" if found.pop() else "full"
+    return "reduced" if blocks[0].element.is_reduced else "full"
 
 
 @naming_arguments

@@ -57,6 +57,11 @@ class Element:
         return range(self.count)
 
     @property
+    def is_reduced(self) -> bool:
+        """Whether it is integrated by fewer points."""
+        return self.variant == "R" and self.cell in ("hexahedron20", "quadrilateral8")
+
+    @property
     def listed(self) -> int:
         """Number of nodes that the deck lists for it."""
         return len(self.written)

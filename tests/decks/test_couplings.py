@@ -243,7 +243,7 @@ def test_bodies_that_share_nodes_but_no_faces_are_joined_there(tmp_path: Path) -
     table, forces = found.tables(state)
     assert table.rows[:, 0].tolist() == list(range(1, 15))
     np.testing.assert_allclose(forces.rows[:, 1:].sum(axis=0), [-12.0, 0.0, 0.0], atol=1e-8)
-    assert any("share 2 nodes, but no faces" in note for note in found.notes)
+    assert any("share 2 nodes: joined" in note for note in found.notes)
 
 
 WRONG = [

@@ -39,12 +39,14 @@ def test_a_column_bends_as_calculix_has_it(element: str, calculix, tmp_path: Pat
     np.testing.assert_allclose(at_tip, calculix, rtol=2e-6)
 
 
-def test_a_body_has_one_integration(tmp_path: Path) -> None:
+def test_elements_of_full_and_reduced_integration_are_bodies_that_are_joined(tmp_path: Path) -> None:
+    """Where they share faces: the nodes of these."""
     lines = mesh_cards({"BAR": COLUMN}, "C3D20").splitlines()
     place = next(k for k, line in enumerate(lines) if line.startswith("*ELEMENT")) + 3
     lines.insert(place, "*ELEMENT, TYPE=C3D20R, ELSET=BAR")
-    with pytest.raises(DeckError, match="of full and of reduced integration"):
-        read_deck(deck(tmp_path, "\n".join(lines) + "\n" + STEEL + SECTION + NOTHING))
+    found = read_deck(deck(tmp_path, "\n".join(lines) + "\n" + STEEL + SECTION + NOTHING))
+    assert [body.integration for body in found.scene.bodies.values()] == ["full", "reduced"]
+    assert any("share 8 nodes: joined" in note for note in found.notes)
 
 
 def test_linear_elements_with_a_letter_are_noted(tmp_path: Path) -> None:

@@ -368,3 +368,15 @@ def test_a_row_of_single_shells_is_stabilised(tmp_path: Path) -> None:
     assert deck.scene.bodies["ALL"].integration == "stabilised"
     theory = 1e6 / (3 * 2e5 * 1e4 / 12) + 120 / (2e5 / 2.6 * 100)
     assert moved[node_at(at, 1, 0.5)][2] / theory == pytest.approx(0.98782, abs=1e-4)
+
+
+@pytest.mark.parametrize("kinds", [("S8R", "S6"), ("S4", "S3")])
+def test_quadrilaterals_and_triangles_are_joined(kinds: tuple[str, str], tmp_path: Path) -> None:
+    """CalculiX has 0.2772 with S8R alone and 0.2759 with S6 alone."""
+    widths = [{"S8R": 8, "S6": 6, "S4": 4, "S3": 3}[kind] for kind in kinds]
+    facets = PLATE[1][:4, : widths[0]], triangles(PLATE[1], 8)[[4, 5, 6, 7, 12, 13, 14, 15], : widths[1]]
+    text = text_of(PLATE[0], dict(zip(kinds, facets, strict=True)), CLAMPED, "*DLOAD\nALL, P, 1.")
+    deck, moved, reaction = solved(tmp_path, text)
+    assert [body.integration for body in deck.scene.bodies.values()] == ["reduced", "full"]
+    assert moved[TIP][2] == pytest.approx(0.2766, abs=6e-4)
+    np.testing.assert_allclose(reaction, (0, 0, -800), atol=1e-6)
