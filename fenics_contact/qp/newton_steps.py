@@ -272,6 +272,10 @@ class FaceState:
         """Return the multiplier whose normal forces slip bounds follow, that of the iterate."""
         return self.iterate.multiplier
 
+    def residual(self, problem: DualProblem) -> Vector:
+        """Return the residual that selects the next face, that of the iterate."""
+        return self.iterate.residual
+
     def stall(self, comm: MPI.Comm) -> str:
         """Describe why the last steps made no progress: a cycling or a stationary active set. Collective."""
         if len(self.faces) < 2:
@@ -294,6 +298,25 @@ class RestedState(FaceState):
         """Return the trial multiplier, by which floating bodies came to rest, w = λ − ρ r."""
         trial = self.iterate.multiplier - self.step * self.iterate.residual
         return problem.compliance.pressed(trial, self.step)
+
+
+@dataclass(frozen=True, eq=False)
+class OpenState(FaceState):
+    """The state before the first step from nothing where supports hold torn bodies: nothing touches.
+
+    Pieces have no place before their jumps are closed: the contacts that their gaps select are arbitrary, and
+    are opened a few at a time, 292 of a plate on a ball in 20 steps down to one.
+    """
+
+    def pressing(self, problem: DualProblem) -> Vector:
+        """Return zero: no contact presses."""
+        return np.zeros_like(self.iterate.multiplier)
+
+    def residual(self, problem: DualProblem) -> Vector:
+        """Return one of which no contact closes, w = λ − 2 |λ|."""
+        found, normal = self.iterate.residual.copy(), problem.layout.normal
+        found[normal] = 2.0 * np.abs(self.iterate.multiplier[normal]) / self.step[normal]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,8 +380,13 @@ class FaceSteps:
         return FaceState(iterate, self.natural_step)
 
     def from_rest(self, iterate: Iterate) -> FaceState:
-        """Return the state before the first step from nothing; where nothing floats, nothing came to rest."""
-        kind = RestedState if self.correction.motions.size else FaceState
+        """Return the state before the first step from nothing, in which floating bodies came to rest."""
+        problem = self.problem
+        jumps = global_sum(problem.comm, float(len(problem.layout.equality)))[0]
+        if self.correction.motions.size:
+            kind: type[FaceState] = RestedState
+        else:
+            kind = OpenState if jumps and not problem.second_level.count else FaceState
         return kind(iterate, self.natural_step)
 
     def at_rest(self, iterate: Iterate) -> Iterate:
@@ -401,9 +429,9 @@ class FaceSteps:
     def _next_face(self, state: FaceState, pressing: Vector) -> tuple[Vector, Face]:
         """Classify, with a smaller ρ for discs whose force would otherwise reverse."""
         layout, iterate = self.problem.layout, state.iterate
-        bound = self.problem.law.bound(pressing)
+        bound, residual = self.problem.law.bound(pressing), state.residual(self.problem)
         soft = self.problem.compliance
-        face = classify(layout, bound, iterate.multiplier, iterate.residual, state.step, soft)
+        face = classify(layout, bound, iterate.multiplier, residual, state.step, soft)
         if not state.faces or not self.safeguards.adapts_step:
             return state.step, face
         turned = np.einsum("ia,ia->i", face.direction, state.faces[0].direction) < 0.0

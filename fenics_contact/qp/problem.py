@@ -120,6 +120,10 @@ NO_COMPLIANT_ROWS = CompliantRows(np.zeros(0, dtype=np.int64), np.zeros(0))
 class SecondLevel(Protocol):
     """A coarse space beside that of equilibrium, for preconditioners of faces."""
 
+    @property
+    def count(self) -> int:
+        """How many motions it has on all ranks."""
+
     def on_face(self, face: Face) -> SecondLevelOfFace:
         """Return that of a face. Collective."""
 
@@ -139,6 +143,8 @@ class SecondLevelOfFace(Protocol):
 
 class NoSecondLevel:
     """Equilibrium alone is enough."""
+
+    count = 0
 
     def on_face(self, face: Face) -> NoSecondLevel:
         """Return itself."""

@@ -369,8 +369,9 @@ def _sharper(
 def _unscaled(problem: DualProblem, solution: DualSolution) -> DualSolution:
     """Return the solution for λ of one for μ, with its residuals. Collective.
 
-    Jumps that are last digits for μ, whose rows are equally stiff, are so for λ: where soft and stiff parts
-    are held side by side, jumps of the soft ones would be compared with motions of the stiff ones.
+    Jumps and errors of forces that are last digits for μ, whose rows are equally stiff, are so for λ: where
+    soft and stiff parts are held side by side, jumps of the soft ones would be compared with motions of the
+    stiff ones.
     """
     s = problem.scaling.factor
     multiplier, product = s * solution.multiplier, solution.product / s
@@ -378,6 +379,8 @@ def _unscaled(problem: DualProblem, solution: DualSolution) -> DualSolution:
     residuals = answer.residuals
     if solution.residuals.gluing == 0.0:
         residuals = replace(residuals, gluing=0.0)
+    if solution.residuals.natural == 0.0:
+        residuals = replace(residuals, natural=0.0, violation=0.0)
     return replace(
         solution,
         multiplier=multiplier,
