@@ -54,6 +54,19 @@ class Driven:
         turned = values[self.node, 3:] if self.turning < 0 else values[self.turning, :3]
         return np.concatenate([values[self.node, :3], turned])
 
+    def place(self, mesh: DeckMesh) -> tuple[float, ...] | None:
+        """Return where its force acts, None for the centroid of the surface."""
+        return tuple(mesh.points[self.node, : mesh.blocks[0].element.dim].tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class OnSector(Driven):
+    """A flexible surface of a sector whose node is on the axis: forces along this turn no sector."""
+
+    def place(self, mesh: DeckMesh) -> tuple[float, ...] | None:
+        """Return that its force acts at the centroid."""
+        return None
+
 
 @dataclass(frozen=True, eq=False)
 class TurnedAlone(Driven):
@@ -83,7 +96,8 @@ def read_driven(cards: Sequence[Card], mesh: DeckMesh, orientations: Mapping[str
             mesh.surface_named(surface, card)
             name = card.name_of("CONSTRAINTNAME") or surface
             spread = kind.name == "DISTRIBUTING"
-            given = Driven(card, name, surface, NO_NODES, int(node), -1, spread)
+            of = OnSector if "CYCLICSYMMETRY" in kind.parameters else Driven
+            given = of(card, name, surface, NO_NODES, int(node), -1, spread)
             if card.name_of("ORIENTATION") and spread:
                 rows = oriented(card, orientations, mesh.points[[int(node)]])[0]
                 given = replace(given, axes=rows.tolist())

@@ -91,10 +91,10 @@ class LoadBuilder:
         if not np.isnan(driven.motion(instant)).all():
             raise driven.card.error("the node of a distributing coupling is held: take *KINEMATIC")
         dim, load = self.built.deck.dim, driven.load(instant).tolist()
-        at = self.built.deck.mesh.points[driven.node, :dim]
+        at = driven.place(self.built.deck.mesh)
         moment: Any = tuple(load[3:]) if dim == 3 else load[5]
         given = moment if np.any(moment) else None
-        return [TotalForce(body, name, tuple(load[:dim]), given, tuple(at.tolist()))] if any(load) else []
+        return [TotalForce(body, name, tuple(load[:dim]), given, at)] if any(load) else []
 
     def _of_masses(self, weight: DistributedLoad) -> Iterator[Load]:
         """Yield the weight, or the centrifugal force, of masses at nodes."""

@@ -80,6 +80,16 @@ def test_a_distributing_coupling_takes_forces_along_its_axes(tmp_path: Path) -> 
     np.testing.assert_allclose(root.moment, [-5.0, 0.0, 0.0], atol=1e-6)
 
 
+def test_forces_along_the_axis_of_a_sector_are_spread_evenly(tmp_path: Path) -> None:
+    """As CalculiX has it with CYCLIC SYMMETRY: the arm from the axis counts for the whole ring alone."""
+    high = BAR.replace("501, 4., 0.5, 0.5", "501, 4., 2.5, 0.5")
+    sector = SPREAD.replace("*DISTRIBUTING", "*DISTRIBUTING, CYCLIC SYMMETRY")
+    for cards, moment in ((SPREAD, 420.0), (sector, 0.0)):
+        _, state, _, _ = solved(tmp_path, high + FIXED + cards + step("*CLOAD\n501, 1, 210.\n"))
+        root = state.reactions(about=(0.0, 0.5, 0.5))["BAR BAR_X0"]
+        np.testing.assert_allclose(root.moment, [0.0, 0.0, moment], atol=1e-6)
+
+
 def test_forces_on_nodes_without_elements_go_where_equations_say(tmp_path: Path) -> None:
     """u_501 = (u_17 + 3 u_18) / 4 and u_502 = 2 u_501: 8 on 502 is 4 on 17 and 12 on 18."""
     joined = "*EQUATION\n3\n501, 1, -4., 17, 1, 1., 18, 1, 3.\n2\n502, 1, 1., 501, 1, -2.\n"
