@@ -42,23 +42,26 @@ class LinearCoupling(AtLine):
 
     def equations(self, deck: Nodes) -> list[Equation]:
         """Return a·(u − U − θ × r) = 0 for each node of an element and each of its directions a."""
-        mesh, axes = deck.mesh, deck.axes
-        dim = mesh.blocks[0].element.dim
-        arms = mesh.points[self.nodes] - mesh.points[self.node]
+        nodes, dim = self.nodes[deck.inside[self.nodes]], deck.mesh.blocks[0].element.dim
+        along = self.directions[deck.inside[self.nodes]]
+        arms = deck.mesh.points[nodes] - deck.mesh.points[self.node]
+        own = np.stack([deck.axes.of(node) for node in nodes.tolist()]) if len(nodes) else along
+        parts = [
+            np.einsum("nad,nkd->nka", own, along),
+            -np.einsum("ad,nkd->nka", deck.axes.of(self.node), along),
+            -np.cross(arms[:, None], along),
+        ]
+        factors = np.concatenate(parts, axis=2)
+        used = np.abs(factors) > 1e-14 * (1.0 + np.linalg.norm(arms, axis=1))[:, None, None]
+        flat = (np.abs(along[:, :, dim:]) <= 1e-9).all(axis=2)  # others are out of the plane
         turner = (self.node, 3) if self.turning < 0 else (self.turning, 0)
-        moving = axes.of(self.node)
+        components = np.concatenate([np.arange(6) % 3, turner[1] + np.arange(3)])
         found = []
-        for node, arm, directions in zip(self.nodes.tolist(), arms, self.directions, strict=True):
-            own = axes.of(node)
-            for along in directions if deck.inside[node] else ():
-                if abs(along[dim:]).max(initial=0.0) > 1e-9:
-                    continue  # out of the plane
-                factors = np.concatenate([own @ along, -moving @ along, -np.cross(arm, along)])
-                at = np.flatnonzero(np.abs(factors) > 1e-14 * (1.0 + np.linalg.norm(arm)))
-                nodes = np.repeat([node, self.node, turner[0]], 3)
-                parts = np.concatenate([np.arange(6) % 3, turner[1] + np.arange(3)])
-                entries = (tuple(each[at].tolist()) for each in (nodes, parts, factors))
-                found.append(Equation(self.card, self.row, *entries))
+        for place, k in np.argwhere(flat).tolist():
+            at = np.flatnonzero(used[place, k])
+            members = np.repeat([nodes[place], self.node, turner[0]], 3)
+            entries = (tuple(each[at].tolist()) for each in (members, components, factors[place, k]))
+            found.append(Equation(self.card, self.row, *entries))
         return found
 
 

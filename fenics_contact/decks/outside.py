@@ -91,7 +91,7 @@ def reduced(
                 f"{len(rows)} equations share {len(columns)} components without elements: hold some of these"
             )
         found = _Group.of(matrix[mine], out)
-        kept += [_equation(equations[mine[k]], row) for k, row in found.rest()]
+        kept += [_equation(equations[mine[k]], *row) for k, *row in found.rest()]
         shares.append(found.shares(out, size))
         lost.append(found.lost(out, size))
     onto = sp.diags(moving.ravel().astype(float))  # what is held takes its share by itself
@@ -124,26 +124,29 @@ class _Group:
     def of(cls, matrix: sp.csr_matrix, out: np.ndarray, least: float = 1e-10) -> _Group:
         """Choose the equations to solve; `least`: smallest pivot that counts, over the largest."""
         own = matrix[:, out].toarray()
-        rest = matrix.tolil()
-        rest[:, out] = 0.0
+        kept = np.ones(matrix.shape[1])
+        kept[out] = 0.0
+        rest = (matrix @ sp.diags(kept)).tocsr()
+        rest.eliminate_zeros()
         scaled = own / np.linalg.norm(own, axis=0)
         pivots, order = scipy.linalg.qr(scaled.T, mode="r", pivoting=True)
         size = np.abs(np.diag(pivots))
         rank = int(np.count_nonzero(size > least * size[0]))
-        return cls(own, rest.tocsr(), order[:rank], order[rank:])
+        return cls(own, rest, order[:rank], order[rank:])
 
-    def rest(self) -> Iterator[tuple[int, sp.coo_matrix]]:
-        """Yield the numbers of equations that remain, and their entries."""
+    def rest(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        """Yield the numbers of equations that remain, and their components and factors."""
         if not len(self.left):
             return
         weights = np.linalg.lstsq(self.own[self.solved].T, self.own[self.left].T, rcond=None)[0].T
         whole = (self.others[self.left] - sp.csr_matrix(weights) @ self.others[self.solved]).tocsr()
-        least = 1e-9 * abs(self.others).max()  # coordinates have few digits
+        # Coordinates have few digits.
+        whole.data[np.abs(whole.data) <= 1e-9 * abs(self.others).max()] = 0.0
+        whole.eliminate_zeros()
         for k, number in enumerate(self.left.tolist()):
-            row = whole[k].tocoo()
-            there = np.abs(row.data) > least
-            if there.any():
-                yield number, sp.coo_matrix((row.data[there], (row.row[there], row.col[there])), row.shape)
+            mine = slice(whole.indptr[k], whole.indptr[k + 1])
+            if mine.stop > mine.start:
+                yield number, whole.indices[mine], whole.data[mine]
 
     def shares(self, out: np.ndarray, size: int) -> sp.csr_matrix:
         """Return forces on others on a unit of force on each left out component."""
@@ -160,9 +163,9 @@ class _Group:
         return (picked.T @ sp.csr_matrix(left) @ picked).tocsr()
 
 
-def _equation(of: Equation, row: sp.coo_matrix) -> Equation:
-    """Return an equation with other entries."""
-    node, component = np.divmod(row.col, 6)
+def _equation(of: Equation, place: np.ndarray, factors: np.ndarray) -> Equation:
+    """Return an equation with other entries; `place`: 6 times their nodes, plus their components."""
+    node, component = np.divmod(place, 6)
     return replace(
-        of, nodes=tuple(node.tolist()), components=tuple(component.tolist()), factors=tuple(row.data.tolist())
+        of, nodes=tuple(node.tolist()), components=tuple(component.tolist()), factors=tuple(factors.tolist())
     )
