@@ -554,8 +554,13 @@ class SpringPart(Part):
             raise InvalidInputError(
                 f"a spring needs a second surface or a fixed point, got {self.second!r} and {self.point!r}"
             )
-        second: Any = self.point if self.second is None else self.second.made()
-        return super().made(second=second, name=self.name)
+        return super().made(second=self.second.made() if self.second else self.point, name=self.name)
+
+    @classmethod
+    def written(cls, made: Any) -> dict[str, Any]:
+        """Return the table of the spring, its second end by the key of its kind."""
+        own = {name: getattr(made, name) for name in (*cls.given, "name")}
+        return cls.keys({**own, "second" if "second" in made.surfaces else "point": made.second})
 
 
 @keys_of(ConstraintTerm)

@@ -125,14 +125,14 @@ def _adjusted(built: DeckBodies) -> _Clearances:
     return found
 
 
-#: Types of contact pairs, without blanks, as the other program reads them.
-_TYPES = {"NODETOSURFACE", "SURFACETOSURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR"}
+#: Types of contact pairs, without blanks; the other program overlooks what is behind them.
+_TYPES = ("NODETOSURFACE", "SURFACETOSURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR")
 
 
 def _pair(built: DeckBodies, slave: Surface, master: Surface, of: Sides, given: _Clearances) -> ContactPair:
     card, interaction = of.card, interaction_of(of.card, built.deck.interactions)
     kind = card.name_of("TYPE") or "NODE TO SURFACE"
-    if kind.replace(" ", "") not in _TYPES:
+    if not kind.replace(" ", "").startswith(_TYPES):
         raise card.error(f"TYPE={kind} is not read: NODE TO SURFACE, SURFACE TO SURFACE and MORTAR are")
     adjust = card.parameters.get("ADJUST", "")
     gaps: dict[str, Any] = {"adjust": float(adjust)} if _is_number(adjust) else {"interference": "measured"}

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from mpi4py import MPI
 
-from fenics_contact.decks import DeckError, read_deck
+from fenics_contact import read_scene_file
+from fenics_contact.decks import DeckError, read_deck, write_scene_file
 from fenics_contact.gallery import block
 from tests.decks.solved import solved
 from tests.decks.texts import FIXED, PLAIN_BAR, STEEL, deck, mesh_cards, step
@@ -114,3 +117,13 @@ def test_a_deck_of_springs_alone_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(DeckError, match="it has SPRINGA"):
         read_deck(deck(tmp_path, alone))
+
+
+def test_springs_of_a_deck_are_in_its_scene_file(tmp_path: Path) -> None:
+    both = LINE + "*ELEMENT, TYPE=SPRING2, ELSET=Q\n111, 17, 9\n*SPRING, ELSET=Q\n2, 2\n70.\n"
+    found, state, _, _ = solved(tmp_path, PLAIN_BAR + GROUND + FIXED + both + step(PULL))
+    path, *_ = write_scene_file(found, tmp_path / "again.toml")
+    again = read_scene_file(path, MPI.COMM_SELF, overrides=["solver.tolerance=1e-11"]).solve()
+    assert list(again.springs()) == ["ELEMENT 101", "ELEMENT 111"]
+    one, other = state.gather_displacement("BAR"), again.gather_displacement("BAR")
+    np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-12)
