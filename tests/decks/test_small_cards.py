@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block
 from fenics_contact.materials.plastic import J2Plasticity
-from tests.decks.texts import FIXED, PLAIN_BAR, SECTION, STEEL, deck, mesh_cards, step
+from tests.decks.texts import FIXED, PAIR, PLAIN_BAR, SECTION, STEEL, deck, law, mesh_cards, pressed, step
 
 TIP = step("*DLOAD\n4, P4, -210.\n")
 WOOD = (
@@ -125,3 +125,11 @@ def test_edges_that_turn_elements_inside_out_are_straightened(tmp_path: Path) ->
     np.testing.assert_allclose(*meshes, atol=1e-15)
     assert not any("straight" in each for each in straight.notes)
     refused(tmp_path, TETRAHEDRON.format(0.5).replace("2, 1., 0.", "2, -1., 0.") + rest, "positive Jacobian")
+
+
+def test_types_of_contact_pairs_are_read_without_blanks(tmp_path: Path) -> None:
+    """And without what is behind them, as CalculiX overlooks it."""
+    for kind in ("SURFACETOSURFACE", "Surface to surface sheet down"):
+        text = pressed(PAIR.replace("SURFACE TO SURFACE", kind), law("HARD"))
+        assert len(read_deck(deck(tmp_path, text)).scene.contacts) == 1
+    refused(tmp_path, pressed(PAIR.replace("SURFACE TO", "EDGE TO"), law("HARD")), "TYPE=EDGE TO SURFACE")
