@@ -67,29 +67,35 @@ class DeckResults:
         return [each for each in self.deck.prints if _plain(each) == card and each.step in steps[-1:]]
 
     def fields(self, step: int) -> list[str]:
-        """Return the kinds of fields of a step; displacements and stresses if the deck asks for none."""
-        found = [
+        """Return the kinds of fields of a step; displacements and stresses if the deck asks for none here."""
+        return self._asked_fields(step) or ["DISP", "STRESS"]
+
+    def _asked_fields(self, step: int) -> list[str]:
+        """Return the kinds of fields that the deck asks for, CONTACT where there is contact."""
+        return [
             kind
             for card, kinds in self.kinds.items()
             for each in self.asked(step, card)
             for variable, kind in kinds.items()
-            if variable in each.variables
+            if variable in _short(each) and (kind != "CONTACT" or self.deck.scene.contacts)
         ]
-        anything = any(_plain(each) in self.kinds for each in self.deck.prints)
-        return found if anything else ["DISP", "STRESS"]
 
     @property
     def notes(self) -> list[str]:
         """What is asked for and not written, in words."""
         known = {card: set(kinds) for card, kinds in (*self.kinds.items(), *self.printed.items())}
-        found = [
-            f"*{each.card}, {each.origin.file} line {each.origin.line}: {', '.join(rest)} not written"
-            for each in self.deck.prints
-            if (rest := [name for name in each.variables if name not in known[_plain(each)]])
-        ]
-        asks = any(_plain(each) in self.kinds for each in self.deck.prints)
-        nothing = "the deck asks for no fields (*NODE FILE, *EL FILE): displacements and stresses are written"
-        return found if asks else [*found, nothing]
+        found = list[str]()
+        for each in self.deck.prints:
+            place = f"*{each.card}, {each.origin.file} line {each.origin.line}: "
+            if rest := [name for name in each.variables if name[:4] not in known[_plain(each)]]:
+                found.append(f"{place}{', '.join(rest)} not written")
+            alone = np.setdiff1d(self.deck.node_sets.get(each.where, []), self.numbering.mesh.numbers)
+            if len(alone) and _plain(each) == "NODEPRINT":
+                found.append(f"{place}{len(alone)} nodes of {each.where} belong to no element: not printed")
+        if not all(map(self._asked_fields, self.deck.step_of)):
+            nothing = "where the deck asks for no known fields (*NODE FILE, *EL FILE)"
+            found.append(f"{nothing}, displacements and stresses are written")
+        return found
 
     def nodal(self, state: State, step: int) -> list[FrdField]:
         """Return the fields of a state in a step, those of sets for their nodes alone. Collective."""
@@ -109,7 +115,7 @@ class DeckResults:
             text
             for card in self.printed
             for each in self.asked(step, card)
-            for variable in each.variables
+            for variable in _short(each)
             if variable in self.printed[card]
             for text in tables.of(each, variable)
         )
@@ -117,6 +123,11 @@ class DeckResults:
 
 def _plain(asked: Print) -> str:
     return asked.card.replace(" ", "").upper()
+
+
+def _short(asked: Print) -> list[str]:
+    """Return the variables by their first four letters, which count."""
+    return [name[:4] for name in asked.variables]
 
 
 def _part(of: FrdField, nodes: np.ndarray) -> FrdField:
@@ -209,6 +220,7 @@ class Tables:
         tearing = self.state.torn.decomposition.tearing
         for body, nodes in self.results.deck.node_numbers.items():
             at = np.unique(ContactNodes(self.state.contact, self.state.scene, tearing, body).nodes[1])
+            at = at[at < len(nodes)]
             at = at[nodes[at] > 0]
             numbers.append(nodes[at])
             values.append(contact_values(self.state, body)[at][:, columns])

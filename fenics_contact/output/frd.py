@@ -272,7 +272,9 @@ class BodyNumbers:
     def summed(self, of_bodies: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return values at the nodes of the file, (n, k), those of bodies that share nodes added up."""
         at = np.concatenate([self.nodes[name][self.nodes[name] > 0] for name in of_bodies])
-        values = np.concatenate([of_bodies[name][self.nodes[name] > 0] for name in of_bodies])
+        # Sections of preloads add nodes behind those of the mesh: the other sides of its cut.
+        ours = {name: values[: len(self.nodes[name])] for name, values in of_bodies.items()}
+        values = np.concatenate([ours[name][self.nodes[name] > 0] for name in ours])
         place = np.searchsorted(self.mesh.numbers, at)
         flat = values.reshape(len(values), -1)
         sums = [np.bincount(place, column, minlength=len(self.mesh.numbers)) for column in flat.T]

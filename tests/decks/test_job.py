@@ -26,6 +26,7 @@ from tests.decks.texts import (
     FIXED,
     FREE_TO_CONTRACT,
     PLAIN_BAR,
+    REFERENCE,
     SECTION,
     STEEL,
     deck,
@@ -178,6 +179,19 @@ def test_each_increment_has_a_line_of_progress(tmp_path: Path) -> None:
     assert int(cvg[5][24:33]) == done[1].contacts == 4
 
 
+def test_sections_of_preloads_have_their_nodes_once(tmp_path: Path) -> None:
+    section = "*SURFACE, NAME=CUT\n2, S4\n*NODE, NSET=PULL\n900, 0., 9., 0.\n"
+    bolt = "*PRE-TENSION SECTION, SURFACE=CUT, NODE=900\n1., 0., 0.\n"
+    cards = "*CLOAD\n900, 1, 42.\n*NODE FILE\nU, RF\n*EL FILE\nS\n"
+    both = FIXED.replace("BAR_X0", "BAR_X1").removeprefix("*BOUNDARY\n")
+    path = deck(tmp_path, PLAIN_BAR + section + bolt + FIXED + both + step(cards))
+    job(path)
+    found = read_frd(path.with_suffix(".frd"))
+    stress = np.array(list(found.block("STRESS").values.values()))
+    assert stress == pytest.approx(np.tile([42.0, 0, 0, 0, 0, 0], (len(stress), 1)), abs=1e-3)
+    assert len(found.block("DISP").values) == len(found.nodes) == 20
+
+
 @pytest.mark.parametrize("more", ["", ", NLGEOM"])
 def test_stresses_of_materials_with_a_history_are_those_of_their_points(more: str, tmp_path: Path) -> None:
     """A bar is stretched far beyond its yield stress; it hardens by 100 N/mm²."""
@@ -200,12 +214,21 @@ def test_times_are_written_as_fortran_does(number: float, text: str) -> None:
 
 def test_what_is_not_written_is_noted(tmp_path: Path) -> None:
     notes: list[str] = []
-    cards = "*DLOAD\n4, P4, -1.\n*NODE FILE, NSET=BAR_X1\nU, NT\n"
-    run_job(deck(tmp_path, HELD + step(cards)), MPI.COMM_SELF, note=notes.append)
-    assert "*NODE FILE, model.inp line" in notes[-1]
-    assert "NT not written" in notes[-1]
+    cards = "*DLOAD\n4, P4, -1.\n*NODE FILE, NSET=BAR_X1\nU, NT\n*NODE PRINT, NSET=REF\nU\n"
+    run_job(deck(tmp_path, HELD + REFERENCE + step(cards)), MPI.COMM_SELF, note=notes.append)
+    assert "*NODE FILE, model.inp line" in notes[-2]
+    assert "NT not written" in notes[-2]
+    assert "1 nodes of REF belong to no element: not printed" in notes[-1]
     (block,) = read_frd(tmp_path / "model.frd").blocks
     assert len(block.values) == 4
+
+
+def test_a_file_has_fields_where_a_deck_asks_for_unknown_ones(tmp_path: Path) -> None:
+    notes: list[str] = []
+    path = deck(tmp_path, HELD + step("*DLOAD\n4, P4, -1.\n*NODE FILE\nNT\n*CONTACT FILE\nCDIS\n"))
+    run_job(path, MPI.COMM_SELF, note=notes.append)
+    assert [block.kind for block in read_frd(path.with_suffix(".frd")).blocks] == ["DISP", "STRESS"]
+    assert notes[-1].endswith("displacements and stresses are written")
 
 
 def test_results_of_another_run_are_removed_when_a_deck_is_refused(tmp_path: Path) -> None:
