@@ -57,6 +57,7 @@ class DeckResults:
         cells = [
             FrdCells(each.element.dim, each.numbers, mesh.numbers[each.nodes[:, each.element.written]])
             for each in mesh.blocks
+            if has_type(each)
         ]
         known = FrdMesh(mesh.numbers[used], mesh.points[used], cells)
         return BodyNumbers(self.deck.node_numbers, known, self.deck.thickness)
@@ -84,7 +85,8 @@ class DeckResults:
     def notes(self) -> list[str]:
         """What is asked for and not written, in words."""
         known = {card: set(kinds) for card, kinds in (*self.kinds.items(), *self.printed.items())}
-        found = list[str]()
+        blocks = self.deck.mesh.mesh.blocks
+        found = [f"elements {block.element.name} are not in .frd" for block in blocks if not has_type(block)]
         for each in self.deck.prints:
             place = f"*{each.card}, {each.origin.file} line {each.origin.line}: "
             if rest := [name for name in each.variables if name[:4] not in known[_plain(each)]]:
@@ -119,6 +121,11 @@ class DeckResults:
             if variable in self.printed[card]
             for text in tables.of(each, variable)
         )
+
+
+def has_type(block: Block) -> bool:
+    """Return whether elements are among the types of cells that files have."""
+    return (block.element.dim, len(block.element.written)) in FrdCells.kinds
 
 
 def _plain(asked: Print) -> str:
@@ -199,7 +206,7 @@ class Tables:
         mesh = deck.mesh.mesh
         for body, numbers in deck.element_numbers.items():
             at = self.state.gather_at_points(body)
-            for block in mesh.blocks:
+            for block in filter(has_type, mesh.blocks):
                 mine = np.isin(numbers, block.numbers) & np.isin(numbers, deck.element_sets[asked.where])
                 if mine.any():
                     found.append(_point_rows(block, at, numbers[mine], getattr(at, what)[mine]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,8 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import clean_environment
-from fenics_contact.decks import DeckError, Increment, run_job
-from fenics_contact.decks.results import exponential, points_of
+from fenics_contact.decks import DeckError, Increment, read_deck, run_job
+from fenics_contact.decks.results import exponential, has_type, points_of
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.gallery import block as block_of
 from fenics_contact.mesh import quadratic
@@ -221,6 +222,12 @@ def test_what_is_not_written_is_noted(tmp_path: Path) -> None:
     assert "1 nodes of REF belong to no element: not printed" in notes[-1]
     (block,) = read_frd(tmp_path / "model.frd").blocks
     assert len(block.values) == 4
+
+
+def test_elements_without_a_type_of_cells_are_left_out(tmp_path: Path) -> None:
+    (solid,) = read_deck(single(tmp_path, "C3D8")).mesh.mesh.blocks
+    truss = replace(solid, element=Element("T3D2", "solid", "line", 2, ""))
+    assert [has_type(each) for each in (solid, truss)] == [True, False]
 
 
 def test_a_file_has_fields_where_a_deck_asks_for_unknown_ones(tmp_path: Path) -> None:
