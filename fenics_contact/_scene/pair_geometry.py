@@ -562,7 +562,11 @@ def _moved_by_supports(scene: SceneParts, name: str) -> np.ndarray:
 
 
 def _named(scene: SceneParts, both: tuple[str, str]) -> dict[str, np.ndarray]:
-    """Return for each of two bodies its nodes of pairs, ties and constraints between them."""
+    """Return for each of two bodies its nodes of pairs, ties and constraints between them.
+
+    Facets around nodes of constraints count as named: there one body may go into the other, as shells do by
+    half their thickness where they meet.
+    """
     nodes: dict[str, list[np.ndarray]] = {name: [] for name in both}
     pairs: list[ContactPair | AnyTie] = [*scene.contacts, *scene.ties]
     for pair in pairs:
@@ -573,7 +577,9 @@ def _named(scene: SceneParts, both: tuple[str, str]) -> dict[str, np.ndarray]:
         terms = [term for term in constraint.terms if term.body in both]
         if {term.body for term in terms} == set(both):
             for term in terms:
-                nodes[term.body].append(term.nodes_of(scene.bodies[term.body].mesh))
+                mesh = scene.bodies[term.body].mesh
+                own, (facets, _) = term.nodes_of(mesh), mesh.linear.boundary
+                nodes[term.body] += [own, facets[np.isin(facets, own).any(axis=1)].ravel()]
     return {name: np.concatenate([*found, np.zeros(0, dtype=np.int64)]) for name, found in nodes.items()}
 
 

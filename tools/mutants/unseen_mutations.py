@@ -38,6 +38,30 @@ UNSEEN_MUTATIONS = (
         ("tests/pairing/test_mortar_derivative.py::test_the_pseudo_inverse_of_a_sliver_turns_with_it",),
     ),
     Mutation(
+        "one layer of reduced cells in contact has no share of full integration",
+        "_scene/body.py",
+        "or touches_in_one_layer(self.mesh)",
+        "or False",
+        (
+            "tests/fem/test_thin_bodies.py::"
+            "test_two_plates_in_contact_share_the_load_by_one_layer_of_reduced_cells",
+        ),
+    ),
+    Mutation(
+        "forces at corners of shells are shared otherwise than in CalculiX",
+        "decks/shells.py",
+        "(middle, 2.0)",
+        "(middle, 1.0)",
+        ("tests/decks/test_shells.py::test_plates_move_as_calculix_prints",),
+    ),
+    Mutation(
+        "knots of shells are rigid",
+        "decks/shell_motions.py",
+        "ways[..., 6] = arms",
+        "ways[..., 6] = 0.0",
+        ("tests/decks/test_shells.py::test_shells_that_meet_at_right_angles_are_joined_as_by_knots",),
+    ),
+    Mutation(
         "MEANROT takes the common displacement for a rotation",
         "decks/multi_point.py",
         "vectors -= vectors.mean(axis=0)",
