@@ -54,7 +54,8 @@ class Deck:
         prints: What results it asks for.
         notes: What is done otherwise than the deck says, and known cards without effect, in words.
         thickness: Thickness of plane bodies, by which forces of the deck are divided, [length]; 1 for others.
-        node_numbers: Body -> numbers in the deck of the nodes of its mesh, 0 for nodes that it has not.
+        node_numbers: Body -> numbers in the deck of the nodes of its mesh, 0 for nodes that it has not. Nodes
+            across shells have numbers above all of the deck.
         element_numbers: Body -> numbers in the deck of the cells of its mesh.
         node_sets: Name -> numbers of nodes in the deck, ascending.
         element_sets: Name -> numbers of elements in the deck, ascending.
