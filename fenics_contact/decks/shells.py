@@ -109,7 +109,10 @@ class _Carrier:
 
     @cached_property
     def _direct(self) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes in the middle that are held themselves, and the numbers of their owners."""
+        """Nodes in the middle that are held themselves, and the numbers of their owners.
+
+        Where a node has axes of its own CalculiX holds the mean alone, and so is it here.
+        """
         motions = self.motions
         held = (motions.ends[:, 1] >= 0) & self.marks[:, :3].any(axis=1)
         owner = np.flatnonzero(held & ~motions.is_knot & ~self._turned)
@@ -172,10 +175,7 @@ class _Carrier:
         """Yield the equations of what is held otherwise than node by node, and of hinges at solids."""
         held = self.marks
         number, k = np.nonzero(held[:, :3])
-        nodes, middle = self.motions.nodes[number], self.motions.ends[number, 1]
-        yield Rows.of(self._local[6 * number + k], self._given(nodes, k))
-        bare = (middle >= 0) & self._turned[number] & ~self.motions.is_knot[number]
-        yield self._follows(middle[bare], nodes[bare], k[bare])
+        yield Rows.of(self._local[6 * number + k], self._given(self.motions.nodes[number], k))
         for pattern in np.unique(held[held[:, 3:].any(axis=1), 3:], axis=0):
             mine = np.flatnonzero((held[:, 3:] == pattern).all(axis=1))
             yield self._turns(mine, 3 + np.flatnonzero(pattern))
@@ -313,6 +313,8 @@ class ShellPrints:
         shells, numbers = deck.mesh.shells, np.append(deck.mesh.numbers, -1)
         here = np.isin(steps.rows.node, shells.node) & ~deck.inside[steps.rows.node]
         rows = Rows(*(each[here] for each in steps.rows.columns))
+        before = sum(len(set(each.nodes)) > 1 for each in steps.equations)  # equations of the deck itself
+        rows = replace(rows, number=rows.number + before)
         sources = np.repeat(np.arange(len(numbers))[:, None], 2, axis=1)
         sources[shells.node] = shells.sources
         return cls(numbers[shells.sources], numbers[shells.ends], rows, numbers[sources[rows.node]])

@@ -190,7 +190,7 @@ class SupportBuilder:
         number, node, component, factor = self._rows.columns
         axes, parts = self.built.deck.axes, self.built.parts
         along = np.eye(6, 3)[component]
-        for place in np.flatnonzero(axes.turned(node)):
+        for place in np.flatnonzero(axes.turned(node) & (component < 3)):
             along[place] = axes.of(int(node[place]))[component[place]]
         found = []
         for body in self.built.meshes:

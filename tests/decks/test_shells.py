@@ -58,6 +58,7 @@ def solved(folder: Path, text: str) -> tuple[Deck, dict[int, np.ndarray], np.nda
 
 CLAMPED = [(FIXED, "1, 6")]
 HINGED = [(FIXED, "1, 3"), (FREE, "3, 3")]
+TURNED = "*TRANSFORM, NSET=NALL\n1., 1., 0., -1., 1., 0."
 #: What is held and loaded, the section, the node and what CalculiX prints for it.
 CASES = {
     "force at a corner": (CLAMPED, f"*CLOAD\n{TIP + 1}, 3, 1000.", "", TIP, (0, 0, 9.475214e-01)),
@@ -76,6 +77,10 @@ CASES = {
         [(FIXED, "1, 6"), (FREE, "5, 5, 0.01")], "*DLOAD\nALL, P, 1.", "", TIP,
         (3.074983e-05, 0, -1.039210e-01),
     ),
+    "clamped along turned axes": (
+        [(FIXED, "1, 6"), (FREE, "3, 3")], "*DLOAD\nALL, P, 1.", TURNED,
+        MIDDLE, (1.566196e-05, 0, 1.231190e-02),
+    ),
     "weight, end lifted": (
         [(FIXED, "1, 6"), (FREE, "3, 3, 0.1")], "*DLOAD\nALL, GRAV, 10., 0., 0., -1.", "",
         MIDDLE, (0, 0, -4.426520e-01),
@@ -87,7 +92,8 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_plates_move_as_calculix_prints(case: str, tmp_path: Path) -> None:
     held, loads, section, node, calculix = CASES[case]
-    _, moved, _ = solved(tmp_path, text_of(PLATE[0], {"S8R": PLATE[1]}, held, loads, section))
+    model, section = (section, "") if section == TURNED else ("", section)
+    _, moved, _ = solved(tmp_path, text_of(PLATE[0], {"S8R": PLATE[1]}, held, loads, section, model=model))
     np.testing.assert_allclose(moved[node], calculix, atol=1e-5 * np.abs(calculix).max())
 
 
@@ -233,20 +239,17 @@ THINNER = 1.775730
 
 
 def test_local_axes_and_reactions_of_hinged_nodes(tmp_path: Path) -> None:
-    """Held along turned axes by all of three, or along x, y and z: the same."""
-    found = []
+    """Their sum is the load, whatever the axes along which they are held."""
     for model in ("", "*TRANSFORM, NSET=NALL\n1., 1., 0., -1., 1., 0."):
         text = text_of(PLATE[0], {"S8R": PLATE[1]}, HINGED, "*DLOAD\nALL, P, 1.", model=model)
         text = text.replace("NSET=NALL, TOTALS=ONLY", "NSET=NALL, TOTALS=YES")
         (tmp_path / "shell.inp").write_text(text)
         deck = read_deck(tmp_path / "shell.inp")
         state = deck.solve(MPI.COMM_WORLD, tolerance=1e-10)[-1]
-        moved, reaction = deck.tables(state)
-        found.append(moved.rows)
+        _, reaction = deck.tables(state)
         held = {int(row[0]) - 1 for row in reaction.rows[:-1] if np.abs(row[1:]).max() > 1e-3}
         assert held <= set(FIXED.tolist()) | set(FREE.tolist())
         np.testing.assert_allclose(reaction.rows[-1, 1:], (0, 0, -800), atol=1e-6)
-    np.testing.assert_allclose(found[0], found[1], atol=1e-8)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -381,3 +384,12 @@ def test_quadrilaterals_and_triangles_are_joined(kinds: tuple[str, str], tmp_pat
     assert [body.integration for body in deck.scene.bodies.values()] == ["reduced", "full"]
     assert moved[TIP][2] == pytest.approx(0.2766, abs=6e-4)
     np.testing.assert_allclose(reaction, (0, 0, -800), atol=1e-6)
+
+
+def test_equations_link_nodes_of_shells(tmp_path: Path) -> None:
+    model = f"*EQUATION\n2\n{TIP + 1}, 3, 1., {MIDDLE + 1}, 3, -2."
+    _, moved, _ = solved(
+        tmp_path, text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.", model=model)
+    )
+    np.testing.assert_allclose(moved[MIDDLE], (1.590130e-05, 0, 7.864884e-02), atol=1e-7)
+    np.testing.assert_allclose(moved[TIP], (3.074983e-05, 0, 1.570886e-01), atol=1e-7)
