@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import ClassVar, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -144,7 +144,7 @@ class SecondLevelOfFace(Protocol):
 class NoSecondLevel:
     """Equilibrium alone is enough."""
 
-    count = 0
+    count: ClassVar[int] = 0
 
     def on_face(self, face: Face) -> NoSecondLevel:
         """Return itself."""
