@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -98,8 +99,11 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     projection = best_projections(near.part(near.beside == 0.0), rounding)
     waiting = np.setdiff1d(np.arange(len(points)), projection.point)
     if len(waiting):
-        reached = _solve(points, normals, master, *facets_in_reach(tree, radius, points, waiting), rounding)
-        projection = join([projection, best_projections(reached, rounding)])
+        sides, reached = _Sides.of(master), []
+        for point, facet in facets_in_reach(tree, radius, points, waiting):
+            over = sides.may_be_over(points, normals, point, facet)
+            reached.append(_solve(points, normals, master, point[over], facet[over], rounding))
+        projection = join([projection, best_projections(join(reached), rounding)])
     gap = projection.gap - heights(master, projection.facet, projection.local).value
     return replace(projection, gap=gap, lost=np.setdiff1d(projection.lost, projection.point))
 
@@ -133,17 +137,74 @@ def _least_distances(
     Facets lie inside planes through their edges, and between one above and one below them. `slack`:
     relative, for rounding and projections barely outside a facet.
     """
-    corners = master.points[master.facets]
-    middle, above = corners.mean(axis=1), _unit(vector_areas(master.points, master.facets))[:, None]
-    along = np.roll(corners, -1, axis=1) - corners
-    out = np.concatenate([_unit(along if master.dim == 2 else np.cross(along, above)), above, -above], axis=1)
-    ends = (1.0 + slack) * np.einsum("fkd,fcd->fkc", out, corners - middle[:, None]).max(axis=2)
+    sides = _Sides.of(master)
+    out, ends, middle = sides.out, (1.0 + slack) * sides.ends, sides.middle
     # Facets last: what follows are sums of few long arrays.
     last = (np.asfortranarray(each).T.take(facet, axis=-1) for each in (out, ends, middle))
     directions, farthest, start = last
     away = np.einsum("dknf,dnf->knf", directions, points.T[:, :, None] - start) - farthest
     beside, over = (np.maximum(each.max(axis=0), 0.0) for each in (away[:-2], away[-2:]))
     return np.asarray((1.0 - slack) * np.hypot(beside, over))
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Planes between which facets lie: through their edges, above and below them.
+
+    `out`: unit normals of these, edges first, shape (n_facets, n_planes, dim); `ends`: their distances from
+    `middle`, the means of the corners, shape (n_facets, n_planes), [length]; `normals`: those of the corners,
+    shape (n_facets, n_corners, dim).
+    """
+
+    out: np.ndarray
+    ends: np.ndarray
+    middle: np.ndarray
+    normals: np.ndarray
+
+    @classmethod
+    def of(cls, master: FacetedSurface) -> _Sides:
+        """Return those of a surface."""
+        corners = master.points[master.facets]
+        middle, above = corners.mean(axis=1), _unit(vector_areas(master.points, master.facets))[:, None]
+        along = np.roll(corners, -1, axis=1) - corners
+        edges = _unit(along if master.dim == 2 else np.cross(along, above))
+        out = np.concatenate([edges, above, -above], axis=1)
+        ends = np.einsum("fkd,fcd->fkc", out, corners - middle[:, None]).max(axis=2)
+        return cls(out, ends, middle, master.normals[master.facets])
+
+    def may_be_over(
+        self,
+        points: np.ndarray,
+        normals: np.ndarray,
+        point: np.ndarray,
+        facet: np.ndarray,
+        slack: float = 0.3,
+    ) -> np.ndarray:
+        """Return the pairs that can have a projection that faces its point, ascending.
+
+        Where x = x(ξ) + g n(ξ), x is no farther beyond an edge than x(ξ), but for the tilt of n along g.
+        `slack`: share for projections beside the facet, where corners have other weights than between them.
+        """
+        away = points[point] - self.middle[facet]
+        reach = np.sqrt(np.einsum("nd,nd->n", away, away)) + self._width[facet]
+        left = np.arange(len(point))
+        for k in range(self.out.shape[1] - 2):
+            of = facet[left]
+            beyond = np.einsum("nd,nd->n", self.out[of, k], away[left])
+            left = left[beyond <= (1.0 + slack) * self.ends[of, k] + self._tilt[of, k] * reach[left]]
+        towards = np.einsum("ncd,nd->nc", self.normals[facet[left]], normals[point[left]])
+        return left[towards.min(axis=1) - slack * np.ptp(towards, axis=1) < 0.0]
+
+    @cached_property
+    def _width(self) -> np.ndarray:
+        return np.asarray(self.ends.max(axis=1))
+
+    @cached_property
+    def _tilt(self) -> np.ndarray:
+        """By how much interpolated normals lean over the edges, with a margin, (n_facets, n_edges)."""
+        across = np.einsum("fcd,fd->fc", self.normals, _unit(self.normals.mean(axis=1))).min(axis=1)
+        tilt = np.abs(np.einsum("fcd,fkd->fck", self.normals, self.out[:, :-2])).max(axis=1)
+        return np.asarray(1.3 * tilt / np.maximum(across, 1e-3)[:, None])
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
@@ -160,18 +221,24 @@ def nearest_facets(tree: cKDTree, points: np.ndarray, nearest: int = 9) -> tuple
 
 
 def facets_in_reach(
-    tree: cKDTree, radius: np.ndarray, points: np.ndarray, waiting: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Pair the remaining points with all facets that can be closest, for any grading of the mesh."""
-    if len(waiting) == 0:
-        return waiting, waiting
+    tree: cKDTree, radius: np.ndarray, points: np.ndarray, waiting: np.ndarray, most: int = 1_000_000
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the remaining points with all facets that can be closest, for any grading of the mesh.
+
+    `most`: pairs at a time, or those of one point.
+    """
+    if not len(waiting):
+        yield waiting, waiting
+        return
     nearest, _ = tree.query(points[waiting])
-    lists = tree.query_ball_point(points[waiting], REACH * nearest + radius.max())
-    pair = np.repeat(np.arange(len(waiting)), [len(facets) for facets in lists])
-    facet = np.concatenate(lists).astype(np.int64)
-    distance = np.linalg.norm(points[waiting[pair]] - tree.data[facet], axis=1)
-    near = distance <= REACH * nearest[pair] + radius[facet]
-    return waiting[pair[near]], facet[near]
+    farthest = REACH * nearest + radius.max()
+    for some in np.split(np.arange(len(waiting)), np.arange(0, len(waiting), 1 + most // tree.n)[1:]):
+        lists = tree.query_ball_point(points[waiting[some]], farthest[some])
+        pair = np.repeat(some, [len(facets) for facets in lists])
+        facet = np.concatenate([*lists, []]).astype(np.int64)
+        distance = np.linalg.norm(points[waiting[pair]] - tree.data[facet], axis=1)
+        near = distance <= REACH * nearest[pair] + radius[facet]
+        yield waiting[pair[near]], facet[near]
 
 
 def _solve(

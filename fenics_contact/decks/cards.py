@@ -219,6 +219,7 @@ def steps_of(deck: DeckCards) -> tuple[DeckCards, DeckSteps]:
     given += mean_equations(deck.means, ever) if held else ()
     moving = np.tile(deck.inside[:, None], 6)
     moving[:, 3:] = False
+    moving[deck.mesh.shells.node] = True
     found = reduced(given, ~(moving | ever | deck.references[:, None]), moving)
     deck.axes.check(steps)
 

@@ -54,6 +54,7 @@ class NoSoftMotions(NoSecondLevel):
     scaled: CoarseSpace
     factor: np.ndarray | float
     size: int
+    count: ClassVar[int] = 0
 
     def coarse(self, restriction: sp.csr_matrix) -> CoarseSpace:
         """Return the coarse space of some scaled rows Z. Collective."""

@@ -200,14 +200,14 @@ class FaceNewton:
 
     Floating bodies come to rest before the first step and after every one (`RigidMotionCorrection`): their
     motions balance the load with the forces of the next guess. A cold start knows nothing of contact: its
-    first slip bounds follow these forces, and where no body floats its first face has no contact. Three
-    further safeguards keep the active set from cycling. A disc whose friction force would turn by more than a
-    right angle has too large a ρ, which is reduced until the force keeps its direction or the disc sticks. A
-    step that is worse than the last two iterates is shortened, at no cost in products. Steps without progress
-    are followed by a rescue from the best iterate so far, by proximal points, whose convex potential a line
-    search descends (`qp.rescue`), or without a preconditioner by SMALSE where bodies float; the history
-    reports whether the active set cycled or the residual stagnated. No result is accepted before its
-    residuals are recomputed.
+    first slip bounds follow these forces, and where no body floats only the closest contacts may be closed.
+    Three further safeguards keep the active set from cycling. A disc whose friction force would turn by more
+    than a right angle has too large a ρ, which is reduced until the force keeps its direction or the disc
+    sticks. A step that is worse than the last two iterates is shortened, at no cost in products. Steps
+    without progress are followed by a rescue from the best iterate so far, by proximal points, whose convex
+    potential a line search descends (`qp.rescue`), or without a preconditioner by SMALSE where bodies float;
+    the history reports whether the active set cycled or the residual stagnated. No result is accepted before
+    its residuals are recomputed.
 
     Attributes:
         tolerance: Every residual of `Residuals` ends below it.

@@ -302,20 +302,23 @@ class RestedState(FaceState):
 
 @dataclass(frozen=True, eq=False)
 class OpenState(FaceState):
-    """The state before the first step from nothing where supports hold torn bodies: nothing touches.
+    """The state before the first step from nothing where no body floats.
 
-    Pieces have no place before their jumps are closed: the contacts that their gaps select are arbitrary, and
-    are opened a few at a time, 292 of a plate on a ball in 20 steps down to one.
+    Torn pieces have no place before their jumps are closed: which contacts their gaps select is arbitrary
+    then, and those of a plate on a ball are opened a few at a time, 292 in 20 steps down to one. Only the
+    closest ones may be among them.
     """
 
     def pressing(self, problem: DualProblem) -> Vector:
-        """Return zero: no contact presses."""
-        return np.zeros_like(self.iterate.multiplier)
+        """Return the multiplier without forces on contacts that are farther apart."""
+        found = self.iterate.multiplier.copy()
+        found[problem.layout.normal[problem.apart]] = 0.0
+        return found
 
     def residual(self, problem: DualProblem) -> Vector:
-        """Return one of which no contact closes, w = λ − 2 |λ|."""
-        found, normal = self.iterate.residual.copy(), problem.layout.normal
-        found[normal] = 2.0 * np.abs(self.iterate.multiplier[normal]) / self.step[normal]
+        """Return one by which they do not close, w = λ − 2 |λ|."""
+        found, apart = self.iterate.residual.copy(), problem.layout.normal[problem.apart]
+        found[apart] = 2.0 * np.abs(self.iterate.multiplier[apart]) / self.step[apart]
         return found
 
 
@@ -381,12 +384,7 @@ class FaceSteps:
 
     def from_rest(self, iterate: Iterate) -> FaceState:
         """Return the state before the first step from nothing, in which floating bodies came to rest."""
-        problem = self.problem
-        jumps = global_sum(problem.comm, float(len(problem.layout.equality)))[0]
-        if self.correction.motions.size:
-            kind: type[FaceState] = RestedState
-        else:
-            kind = OpenState if jumps and not problem.second_level.count else FaceState
+        kind = RestedState if self.correction.motions.size else OpenState
         return kind(iterate, self.natural_step)
 
     def at_rest(self, iterate: Iterate) -> Iterate:

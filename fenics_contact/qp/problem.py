@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Protocol, TypeAlias, runtime_checkable
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.cones import SlipLaw, TrescaLaw
 from fenics_contact.qp.face import EXACT, ContactLaw, Face, Marks
 from fenics_contact.qp.layout import ContactLayout
-from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 Operator = Callable[[Vector], Vector]
 #: Called with the number of F-products so far and, after a step of a solver, with its residual.
@@ -120,10 +120,6 @@ NO_COMPLIANT_ROWS = CompliantRows(np.zeros(0, dtype=np.int64), np.zeros(0))
 class SecondLevel(Protocol):
     """A coarse space beside that of equilibrium, for preconditioners of faces."""
 
-    @property
-    def count(self) -> int:
-        """How many motions it has on all ranks."""
-
     def on_face(self, face: Face) -> SecondLevelOfFace:
         """Return that of a face. Collective."""
 
@@ -143,8 +139,6 @@ class SecondLevelOfFace(Protocol):
 
 class NoSecondLevel:
     """Equilibrium alone is enough."""
-
-    count: ClassVar[int] = 0
 
     def on_face(self, face: Face) -> NoSecondLevel:
         """Return itself."""
@@ -224,6 +218,16 @@ class DualProblem:
     def between_supports(self) -> Marks:
         """The marks of `supported`, shape (size,)."""
         return np.broadcast_to(self.supported, self.layout.size)
+
+    @cached_property
+    def apart(self) -> Marks:
+        """Which contacts are farther apart before anything moves than the closest one, shape (n_contact,).
+
+        None where it is not known. Collective on first use.
+        """
+        gap = np.zeros(self.layout.n_contact) if self.given is None else self.given[self.layout.normal]
+        closest = -global_max(self.comm, float(np.max(-gap, initial=-np.inf)))
+        return np.asarray(gap > closest + 1e-3 * abs(closest))
 
     @cached_property
     def law(self) -> SlipLaw:

@@ -177,6 +177,7 @@ class Layer(Element):
 
 #: Faces of shells that have names; a pressure without a number acts on the first.
 _SIDES = {"SNEG": 0, "SPOS": 1, "P": 0}
+#: Types of shells with the number of their nodes.
 _SHELLS = {"S3": 3, "S3R": 3, "S4": 4, "S4R": 4, "S6": 6, "S8": 8, "S8R": 8}
 
 

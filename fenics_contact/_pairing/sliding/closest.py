@@ -130,7 +130,8 @@ class ClosestPoints:
         near = self._from_middles(targets, normals, waiting[pair].ravel(), facet.ravel())
         near = best_projections(near.part(near.beside == 0.0), rounding)
         still = np.setdiff1d(waiting, near.point)
-        reached = self._from_middles(targets, normals, *facets_in_reach(tree, radius, targets, still))
+        pairs = facets_in_reach(tree, radius, targets, still)
+        reached = join([self._from_middles(targets, normals, *each) for each in pairs])
         return join([near, best_projections(reached, rounding)])
 
     def _allowed(
