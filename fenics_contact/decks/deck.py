@@ -149,7 +149,7 @@ class Deck:
         for variable in asked.variables:
             name = f"{asked.card} {variable} {asked.where}".strip()
             if asked.card == "NODE PRINT" and variable in ("U", "RF"):
-                rows = self._of_nodes(asked.where, state, variable)
+                rows = self.of_nodes(asked.where, state, variable)
                 if asked.totals:
                     sums = [0.0, *rows[:, 1:].sum(axis=0)]
                     rows = np.vstack([rows[:0] if asked.totals == "ONLY" else rows, sums])
@@ -160,8 +160,14 @@ class Deck:
                 names = [f"S{'xyz'[a]}{'xyz'[b]}" for a, b in _COMPONENTS]
                 yield PrintTable(name, ("element", *names), self._of_elements(asked.where, state))
 
-    def _of_nodes(self, where: str, state: State, variable: str) -> np.ndarray:
-        """Return displacements or reactions of nodes behind their numbers."""
+    def of_nodes(self, where: str, state: State, variable: str) -> np.ndarray:
+        """Return displacements or reactions of nodes behind their numbers, (n, 1 + dim). Collective.
+
+        Args:
+            where: A set of nodes, all if empty.
+            state: The state.
+            variable: "U" or "RF".
+        """
         found = list[np.ndarray]()
         for body, nodes in self.node_numbers.items():
             if variable == "U":
@@ -177,6 +183,14 @@ class Deck:
             return rows[first]
         sums = [np.bincount(number.ravel(), column) for column in rows[:, 1:].T]  # of bodies that share nodes
         return np.column_stack([nodes, *sums])
+
+    def are_of_shells(self, nodes: np.ndarray) -> np.ndarray:
+        """Return which numbers of nodes are those of shells, same shape."""
+        return np.isin(nodes, self._shells.sources)
+
+    def across_shells(self, nodes: np.ndarray) -> np.ndarray:
+        """Return numbers of nodes with those of the nodes across the thickness of shells, ascending."""
+        return self._shells.across(nodes)
 
     def _of_elements(self, where: str, state: State) -> np.ndarray:
         """Return the mean stresses of elements behind their numbers."""

@@ -91,7 +91,8 @@ class DeckResults:
             place = f"*{each.card}, {each.origin.file} line {each.origin.line}: "
             if rest := [name for name in each.variables if name[:4] not in known[_plain(each)]]:
                 found.append(f"{place}{', '.join(rest)} not written")
-            alone = np.setdiff1d(self.deck.node_sets.get(each.where, []), self.numbering.mesh.numbers)
+            nodes = self.deck.node_sets.get(each.where, self.numbering.mesh.numbers)
+            alone = np.setdiff1d(nodes, [*self.numbering.mesh.numbers, *self.shells_among(nodes)])
             if len(alone) and _plain(each) == "NODEPRINT":
                 found.append(f"{place}{len(alone)} nodes of {each.where} belong to no element: not printed")
         if not all(map(self._asked_fields, self.deck.step_of)):
@@ -99,11 +100,15 @@ class DeckResults:
             found.append(f"{nothing}, displacements and stresses are written")
         return found
 
+    def shells_among(self, nodes: np.ndarray) -> np.ndarray:
+        """Return which of some numbers are those of shells alone, for which others are in the mesh."""
+        return np.setdiff1d(nodes[self.deck.are_of_shells(nodes)], self.numbering.mesh.numbers)
+
     def nodal(self, state: State, step: int) -> list[FrdField]:
         """Return the fields of a state in a step, those of sets for their nodes alone. Collective."""
         found = nodal_fields(state, self.numbering, self.fields(step))
         chosen = {
-            kind: np.concatenate([self.deck.node_sets[each.where] for each in some])
+            kind: self.deck.across_shells(np.concatenate([self.deck.node_sets[e.where] for e in some]))
             for card, kinds in self.kinds.items()
             for kind in kinds.values()
             if (some := self.asked(step, card)) and all(each.where in self.deck.node_sets for each in some)
@@ -190,8 +195,15 @@ class Tables:
 
     def _nodal(self, kind: str, asked: Print) -> tuple[np.ndarray, np.ndarray]:
         (field,) = nodal_fields(self.state, self.results.numbering, (kind,))
-        mine = np.isin(field.numbers, self.results.deck.node_sets.get(asked.where, field.numbers))
-        return field.numbers[mine], field.values[mine]
+        asked_for = self.results.deck.node_sets.get(asked.where, field.numbers)
+        mine, shells = np.isin(field.numbers, asked_for), self.results.shells_among(asked_for)
+        numbers, values = field.numbers[mine], field.values[mine]
+        if len(shells):
+            rows = self.results.deck.of_nodes(asked.where, self.state, {"DISP": "U", "FORC": "RF"}[kind])
+            rows = rows[np.isin(rows[:, 0], shells)]
+            numbers, values = np.append(numbers, rows[:, 0]), np.vstack([values, in_space(rows[:, 1:])])
+        order = np.argsort(numbers, kind="stable")
+        return numbers[order], values[order]
 
     def _stresses(self, asked: Print) -> Iterator[str]:
         head = f"stresses (elem, integ.pnt.,sxx,syy,szz,sxy,sxz,syz) for set {asked.where}"

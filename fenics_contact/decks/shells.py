@@ -324,6 +324,11 @@ class ShellPrints:
         """Whether equations hold nodes of shells."""
         return len(self.rows.number) > 0
 
+    def across(self, nodes: np.ndarray) -> np.ndarray:
+        """Return numbers of nodes with those of the nodes across the thickness, ascending."""
+        ends = self.ends[np.isin(self.sources, nodes).all(axis=1)]
+        return np.union1d(nodes, ends[ends > 0])
+
     def moved(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Return displacements of nodes of a body behind their numbers in the deck, (n, 1 + dim).
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.decks import Deck, read_deck
+from fenics_contact.decks import Deck, read_deck, run_job
 from fenics_contact.readers.deck_cards import DeckError
 from tests.fem.surfaces import grid, node_at
 
@@ -393,3 +393,21 @@ def test_equations_link_nodes_of_shells(tmp_path: Path) -> None:
     )
     np.testing.assert_allclose(moved[MIDDLE], (1.590130e-05, 0, 7.864884e-02), atol=1e-7)
     np.testing.assert_allclose(moved[TIP], (3.074983e-05, 0, 1.570886e-01), atol=1e-7)
+
+
+def test_jobs_print_displacements_of_the_nodes_of_shells(tmp_path: Path) -> None:
+    """Their numbers are not in the mesh of the results, which has those across the thickness."""
+    text = text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.")
+    deck, moved, _ = solved(tmp_path, text)
+    notes = list[str]()
+    files = run_job(tmp_path / "shell.inp", MPI.COMM_SELF, note=notes.append, tolerance=1e-9)
+    printed = next(each for each in files if each.suffix == ".dat").read_text()
+    table = printed[printed.index("displacements") :].split("forces")[0].splitlines()
+    rows = [[float(number) for number in line.split()] for line in table if len(line.split()) == 4]
+    assert len(rows) == len(moved) == 37
+    for number, *values in rows:
+        np.testing.assert_allclose(values, moved[int(number) - 1], rtol=1e-5, atol=1e-9)
+    assert not any("belong to no element" in note for note in notes)
+    across = deck.across_shells(np.array([TIP + 1]))
+    assert len(across) == 4
+    assert across[0] == TIP + 1
