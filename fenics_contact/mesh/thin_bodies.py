@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,15 +21,23 @@ from fenics_contact.mesh.serendipity_cells import serendipity
 CORNERS = {3: 3, 4: 4, 6: 3, 8: 4}
 
 
-def raised(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return points, new ones at the end, and facets with nodes in the middle of their edges, (n, 6 | 8)."""
-    width = cells.shape[1]
-    if width > 4:
-        return points, cells
-    ends = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    edges, number = np.unique(ends, axis=0, return_inverse=True)
-    middle = len(points) + number.reshape(-1, width)
-    return np.concatenate([points, points[edges].mean(axis=1)]), np.hstack([cells, middle])
+def raised(
+    points: np.ndarray, facets: Sequence[np.ndarray]
+) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Return points, new ones at the end, facets with nodes in the middle of their edges, and their sources.
+
+    `facets`: arrays of facets of 3, 4, 6 or 8 nodes each; sources: twice a given point, the ends of the edge
+    of a new one, (n, 2).
+    """
+    itself = np.repeat(np.arange(len(points))[:, None], 2, axis=1)
+    ends = [np.sort(np.stack([f, np.roll(f, -1, axis=1)], axis=2), axis=2).reshape(-1, 2) for f in facets]
+    linear = [each for each, own in zip(ends, facets, strict=True) if own.shape[1] < 5]
+    edges, number = np.unique(np.concatenate([itself[:0], *linear]), axis=0, return_inverse=True)
+    middles = iter(np.split(len(points) + number.ravel(), np.cumsum([len(each) for each in linear])))
+    whole = [
+        np.hstack([own, next(middles).reshape(own.shape)]) if own.shape[1] < 5 else own for own in facets
+    ]
+    return np.vstack([points, points[edges].mean(axis=1)]), whole, np.vstack([itself, edges])
 
 
 def facet_normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
@@ -159,7 +167,7 @@ def thickened(
     places, facets = _checked(points, cells)
     count = len(places)
     depth = _checked_thickness(thickness, count)
-    places, facets = raised(places, facets)
+    places, (facets,), _ = raised(places, [facets])
     depth = _at_middles(depth, facets, len(places))
     if normals is None:
         across = _mean_normals(places, facets)

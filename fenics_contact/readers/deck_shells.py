@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.mesh.thin_bodies import CORNERS, facet_normals, layer_cells
+from fenics_contact.mesh.thin_bodies import CORNERS, facet_normals, layer_cells, raised
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_elements import Layer
 from fenics_contact.readers.deck_mesh import Block, DeckMesh, read_mesh_cards
@@ -27,7 +27,7 @@ def read_solid_mesh(cards: Sequence[Card]) -> DeckMesh:
 
 def _expanded(mesh: DeckMesh, places: Sequence[int], depths: _Depths) -> DeckMesh:
     """Return the mesh with the shells of some blocks as solid cells; their nodes stay as they are."""
-    points, facets, sources = _raised(mesh.points, [mesh.blocks[k].nodes for k in places])
+    points, facets, sources = raised(mesh.points, [mesh.blocks[k].nodes for k in places])
     incidences = _Incidences.of(points, facets, [mesh.blocks[k] for k in places], depths, sources)
     group, sign = incidences.grouped()
     shells, added = incidences.ends(points, sources, group, sign)
@@ -50,21 +50,6 @@ def _expanded(mesh: DeckMesh, places: Sequence[int], depths: _Depths) -> DeckMes
         surfaces=surfaces,
         shells=shells,
     )
-
-
-def _raised(
-    points: np.ndarray, facets: Sequence[np.ndarray]
-) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Return points and facets with midpoints, new points at the end, and the two points of their means."""
-    itself = np.repeat(np.arange(len(points))[:, None], 2, axis=1)
-    ends = [np.sort(np.stack([f, np.roll(f, -1, axis=1)], axis=2), axis=2).reshape(-1, 2) for f in facets]
-    linear = [each for each, own in zip(ends, facets, strict=True) if own.shape[1] < 5]
-    edges, number = np.unique(np.concatenate([itself[:0], *linear]), axis=0, return_inverse=True)
-    middles = iter(np.split(len(points) + number.ravel(), np.cumsum([len(each) for each in linear])))
-    whole = [
-        np.hstack([own, next(middles).reshape(own.shape)]) if own.shape[1] < 5 else own for own in facets
-    ]
-    return np.vstack([points, points[edges].mean(axis=1)]), whole, np.vstack([itself, edges])
 
 
 @dataclass(frozen=True, eq=False)
