@@ -92,15 +92,15 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     g|`` is used; surfaces that face the same way do not touch. Points without any that lie beside the surface
     by no more than a twentieth of a facet's width are projected on the facet's continuation.
     """
-    corners, rounding = master.points[master.facets], coordinate_rounding(master.points)
-    tree = cKDTree(corners.mean(axis=1))
-    radius = np.linalg.norm(corners - tree.data[:, None], axis=2).max(axis=1)
-    near = _in_nearest(points, normals, master, tree, rounding)
+    sides, rounding = _Sides.of(master), coordinate_rounding(master.points)
+    near = _in_nearest(points, normals, master, sides, rounding)
     projection = best_projections(near.part(near.beside == 0.0), rounding)
     waiting = np.setdiff1d(np.arange(len(points)), projection.point)
     if len(waiting):
-        sides, reached = _Sides.of(master), []
-        for point, facet in facets_in_reach(tree, radius, points, waiting):
+        reached = []
+        corners = master.points[master.facets]
+        radius = np.linalg.norm(corners - sides.middle[:, None], axis=2).max(axis=1)
+        for point, facet in facets_in_reach(sides.tree, radius, points, waiting):
             over = sides.may_be_over(points, normals, point, facet)
             reached.append(_solve(points, normals, master, point[over], facet[over], rounding))
         projection = join([projection, best_projections(join(reached), rounding)])
@@ -109,15 +109,15 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
 
 
 def _in_nearest(
-    points: np.ndarray, normals: np.ndarray, master: FacetedSurface, tree: cKDTree, rounding: float
+    points: np.ndarray, normals: np.ndarray, master: FacetedSurface, sides: _Sides, rounding: float
 ) -> Projection:
     """Project points on the facets whose centroids are nearest, but for those that cannot be the closest.
 
     First each on the facet that it is nearest to, then on three more, then on the others: facets that are
     farther away than its projection are left out.
     """
-    point, facet = nearest_facets(tree, points)
-    least = _least_distances(points, master, facet)
+    point, facet = nearest_facets(sides.tree, points)
+    least = _least_distances(points, sides, facet)
     order = np.argsort(least, axis=1, kind="stable")
     facet, least = (np.take_along_axis(each, order, axis=1) for each in (facet, least))
     reach, found = np.full(len(points), np.inf), list[Projection]()
@@ -129,15 +129,12 @@ def _in_nearest(
     return join(found)
 
 
-def _least_distances(
-    points: np.ndarray, master: FacetedSurface, facet: np.ndarray, slack: float = 1e-6
-) -> np.ndarray:
+def _least_distances(points: np.ndarray, sides: _Sides, facet: np.ndarray, slack: float = 1e-6) -> np.ndarray:
     """Return bounds below the distances of points from some facets each, shape (n, facets), [length].
 
     Facets lie inside planes through their edges, and between one above and one below them. `slack`:
     relative, for rounding and projections barely outside a facet.
     """
-    sides = _Sides.of(master)
     out, ends, middle = sides.out, (1.0 + slack) * sides.ends, sides.middle
     # Facets last: what follows are sums of few long arrays.
     last = (np.asfortranarray(each).T.take(facet, axis=-1) for each in (out, ends, middle))
@@ -194,6 +191,11 @@ class _Sides:
             left = left[beyond <= (1.0 + slack) * self.ends[of, k] + self._tilt[of, k] * reach[left]]
         towards = np.einsum("ncd,nd->nc", self.normals[facet[left]], normals[point[left]])
         return left[towards.min(axis=1) - slack * np.ptp(towards, axis=1) < 0.0]
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The facets by their middles."""
+        return cKDTree(self.middle)
 
     @cached_property
     def _width(self) -> np.ndarray:

@@ -377,6 +377,37 @@ def test_no_facet_is_left_out_that_would_have_the_projection(
     assert few < 0.7 * (sum(counts) - few), "hardly a facet was left out"
 
 
+@pytest.mark.parametrize("bumps", [0.0, 1e-3, 0.03, 0.2])
+@pytest.mark.parametrize("corners", [2, 3, 4])
+def test_facets_that_no_far_point_can_be_over_are_all_that_are_left_out(
+    corners: int, bumps: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of points as far away as several facets, which no nearest facet has, all others are tried."""
+    rng, cases = np.random.default_rng(8), []
+    for _ in range(5):
+        surface = rough(corners, rng, bumps)
+        places = surface.points[rng.integers(0, len(surface.points), 200)]
+        normals = surface.normals[rng.integers(0, len(surface.normals), 200)]
+        away = rng.choice([0.5, 2.0, 10.0], (200, 1)) * (normals + rng.normal(size=normals.shape))
+        case = places + away, -normals * rng.choice([-1.0, 1.0], (200, 1)), surface
+        cases.append((case, project(*case)))
+    counts = tried(monkeypatch)
+    for case, _ in cases:
+        project(*case)
+    few = sum(counts)
+
+    def every(self: object, points: object, normals: object, point: np.ndarray, facet: object) -> np.ndarray:
+        return np.arange(len(point))
+
+    monkeypatch.setattr(searched._Sides, "may_be_over", every)
+    for case, found in cases:
+        wanted = project(*case)
+        for name in ("point", "facet", "local", "gap", "normal", "beside"):
+            both = getattr(found, name), getattr(wanted, name)
+            np.testing.assert_allclose(*both, rtol=0.0, atol=1e-13, err_msg=name)
+    assert few < 0.9 * (sum(counts) - few), "hardly a facet was left out"
+
+
 def test_a_node_without_a_normal_is_named_by_its_place() -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 3, 0], [2, 3, 0]])
     with pytest.raises(InvalidInputError, match=r"must have a normal, that at \(2, 3, 0\) has none"):
