@@ -41,10 +41,6 @@ class Dilatation:
         """The polynomials of the undeformed cells."""
         return CellPolynomials(self._points, self._cells, self._element)
 
-    def least(self, displacement: np.ndarray) -> float:
-        """Return the smallest det F of all Gauss points."""
-        return float(self.at(displacement).min())
-
     def at(self, displacement: np.ndarray) -> np.ndarray:
         """Return det F, shape (n_cells, n_gauss), of linear simplices (n_cells, 1)."""
         moved = self._points + displacement.reshape(self._points.shape)
@@ -53,6 +49,18 @@ class Dilatation:
     def _volumes(self, points: np.ndarray) -> np.ndarray:
         """Return the volumes of cells per reference volume, (n_cells, n_gauss)."""
         return self._element.kinematics.volumes(points, self._cells, self._positions)
+
+
+def least_of_cubics(*thirds: np.ndarray) -> float:
+    """Return the smallest value between 0 and 1 of cubic functions, given at 0, 1/3, 2/3, 1, each (n,)."""
+    coefficients = np.linalg.solve(np.vander(np.arange(4) / 3.0, increasing=True), np.stack(thirds))
+    _, slope, half, third = coefficients
+    with np.errstate(all="ignore"):  # straight lines and parabolas have no extremum, or one
+        root = -half - np.copysign(np.sqrt(half**2 - 3.0 * third * slope), half)
+        extrema = np.nan_to_num(np.stack([root / (3.0 * third), slope / root]), posinf=0.0, neginf=0.0)
+    powers = np.clip(extrema, 0.0, 1.0) ** np.arange(4)[:, None, None]
+    inside = np.einsum("kn,kmn->mn", coefficients, powers)
+    return float(min(thirds[0].min(), thirds[-1].min(), inside.min()))
 
 
 #: Bulk modulus at rest of what is not projected, by the shear modulus, in cells of type `UNSEEN`.
@@ -242,9 +250,9 @@ class PointDilatation:
         """Return a tangent as it is."""
         return stiffness
 
-    def least(self, displacement: np.ndarray) -> float:
-        """Return that none is smaller than at the points."""
-        return np.inf
+    def at(self, displacement: np.ndarray) -> np.ndarray:
+        """Return none but those at the points."""
+        return np.zeros(0)
 
 
 class MeanDilatation(PointDilatation):
@@ -311,11 +319,11 @@ class MeanDilatation(PointDilatation):
         D = self._inverse @ self._volume_changes()
         return (stiffness + (D.T @ assembled(self._modulus, (D.shape[0],) * 2) @ D).tocsr()).tocsr()
 
-    def least(self, displacement: np.ndarray) -> float:
-        """Return the smallest θ at a Gauss point."""
+    def at(self, displacement: np.ndarray) -> np.ndarray:
+        """Return θ at the Gauss points of cells that have it, shape (n,)."""
         given = self._dilatation.at(displacement)[..., None]
         values = self._polynomials.at(self._polynomials.coefficients(given)[..., 0])
-        return float(values[self._own].min(initial=1.0))
+        return np.asarray(values[self._own].ravel())
 
     def _set(self, coefficients: np.ndarray) -> None:
         """Set the dilatations, by cell, and the pressures."""

@@ -155,8 +155,8 @@ class Mechanics(Protocol):
     def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
         """Return the response to a displacement, by dof block after block, shape (dim n,), [length]."""
 
-    def least_jacobian(self, displacement: np.ndarray) -> float:
-        """Return the smallest det F at a Gauss point, which takes no assembly."""
+    def jacobians(self, displacement: np.ndarray) -> np.ndarray:
+        """Return det F at the Gauss points, shape (n,), a cubic function; it takes no assembly."""
 
 
 class HistoryMechanics:
@@ -219,7 +219,7 @@ class HistoryMechanics:
             force=force,
             tangent=lambda: self._gauss.assembled(entries),
             energy=None,
-            least_jacobian=self.least_jacobian(displacement),
+            least_jacobian=float(self.jacobians(displacement).min()),
             history=after,
             stress=stress,
             by_stress=partial(self._by_stress, gradient, stress),
@@ -236,9 +236,9 @@ class HistoryMechanics:
                 entries += self._gauss.stiffness(tangent, cells)
         return self._gauss.assembled(entries)
 
-    def least_jacobian(self, displacement: np.ndarray) -> float:
-        """Return the smallest det F; see `Mechanics.least_jacobian`."""
-        return self._dilatation.least(displacement)
+    def jacobians(self, displacement: np.ndarray) -> np.ndarray:
+        """Return det F; see `Mechanics.jacobians`."""
+        return self._dilatation.at(displacement).ravel()
 
     def _heat(self, temperature: np.ndarray | None) -> np.ndarray | None:
         """Return the change of temperature at the points, shape (n_cells, n_gauss)."""
@@ -356,7 +356,7 @@ class HyperelasticMechanics:
         self._mean.follow(displacement)
         force, energy = _dolfinx.assemble_vector(self._force), _dolfinx.assemble_scalar(self._energy)
         tangent = partial(self._stiffness, displacement.copy(), step)
-        return Response(force, tangent, energy, self.least_jacobian(displacement))
+        return Response(force, tangent, energy, float(self.jacobians(displacement).min()))
 
     def _set_heat(self, temperature: np.ndarray | None) -> None:
         """Set the change of temperature, by input node."""
@@ -381,9 +381,9 @@ class HyperelasticMechanics:
         self._displacement.x.array[:] = displacement
         return self._mean.added(assembled(self._tangent, (displacement.size,) * 2))
 
-    def least_jacobian(self, displacement: np.ndarray) -> float:
-        """Return the smallest det F; see `Mechanics.least_jacobian`."""
-        return min(self._dilatation.least(displacement), self._mean.least(displacement))
+    def jacobians(self, displacement: np.ndarray) -> np.ndarray:
+        """Return det F, and the means of cells; see `Mechanics.jacobians`."""
+        return np.concatenate([self._dilatation.at(displacement).ravel(), self._mean.at(displacement)])
 
 
 def prepare_mechanics(templates: Templates, scene: Scene) -> None:
@@ -409,9 +409,9 @@ class LinearMechanics:
         force = self._stiffness @ displacement
         return Response(force, lambda: self._stiffness, float(force @ displacement) / 2, 1.0)
 
-    def least_jacobian(self, displacement: np.ndarray) -> float:
+    def jacobians(self, displacement: np.ndarray) -> np.ndarray:
         """Return 1: in small strain no volume changes."""
-        return 1.0
+        return np.ones(1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -431,6 +431,6 @@ class DependentDofs:
         forces = replace(response, force=np.asarray(self.rows.T @ response.force))
         return forces.with_matrices(lambda matrix: (self.rows.T @ matrix @ self.rows).tocsr())
 
-    def least_jacobian(self, displacement: np.ndarray) -> float:
-        """Return the smallest det F at a Gauss point."""
-        return self.mechanics.least_jacobian(np.asarray(self.rows @ displacement))
+    def jacobians(self, displacement: np.ndarray) -> np.ndarray:
+        """Return det F at the Gauss points."""
+        return self.mechanics.jacobians(np.asarray(self.rows @ displacement))

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from fenics_contact._base.display import displayed
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._fem.composition import composition
+from fenics_contact._fem.kinematics import least_of_cubics
 from fenics_contact._fem.mechanics import MaterialStep, Mechanics, Response
 from fenics_contact._large_deformations.loading import DeadLoads, Loading, RigidStart
 from fenics_contact._large_deformations.moving_contact import (
@@ -348,12 +349,13 @@ class Equations:
         forces = np.zeros(len(contact.torn.numbering.owned))
         return Configuration(displacement, forces, nothing, 0.0, 0.0, contact)
 
-    def least_jacobian(self, displacement: Vector) -> float:
-        """Return the smallest det F at a torn displacement of all ranks. Collective."""
-        comm = self.decomposition.comm
+    def least_jacobian(self, displacement: Vector, moved: Vector) -> float:
+        """Return the smallest det F on the straight way from a torn displacement by another. Collective."""
+        comm, least = self.decomposition.comm, np.inf
         with together(comm):
-            each = zip(self._mechanics, self.decomposition.parts, strict=True)
-            least = min((m.least_jacobian(displacement[part]) for m, part in each), default=1.0)
+            for mechanics, part in zip(self._mechanics, self.decomposition.parts, strict=True):
+                ways = [displacement[part] + third / 3.0 * moved[part] for third in range(4)]
+                least = min(least, least_of_cubics(*map(mechanics.jacobians, ways)))
         return global_min(comm, least)
 
     def evaluate(

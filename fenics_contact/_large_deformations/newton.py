@@ -457,10 +457,13 @@ class _Run:
         return replace(found, fraction=found.fraction * longest)
 
     def _room(self, state: _State, moved: Vector) -> float:
-        """Return the part of a step that keeps cells from being inverted. Collective."""
+        """Return the part of a step on whose way no cell is inverted. Collective.
+
+        Two axes of a cell that turn inside out together leave det F positive at its end.
+        """
         part, start = 1.0, state.evaluation
         while part > 1e-3:
-            least = self.equations.least_jacobian(start.at.displacement + part * moved)
+            least = self.equations.least_jacobian(start.at.displacement, part * moved)
             if least > self.method.room * start.least_jacobian:
                 return part
             part *= 0.5

@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.optimize import brentq
 
 from fenics_contact import (
     AutomaticSteps,
@@ -16,6 +18,7 @@ from fenics_contact import (
     Pressure,
     RigidPlane,
     Scene,
+    Support,
     Surface,
     solve_scene,
 )
@@ -23,8 +26,8 @@ from fenics_contact._base import progress
 from fenics_contact._base.progress import Event, Kind
 from fenics_contact._large_deformations.newton import TangentNewton
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.gallery import rectangle
-from fenics_contact.materials import NeoHooke
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import NeoHooke, Ogden
 
 
 def pad(pressure: float) -> Scene:
@@ -64,3 +67,24 @@ def test_an_overloaded_pad_gives_up_attempts_in_vain_and_reports_them(
     assert any(re.match(r"0 of the load reached, 1 of it fails: \w+", each.words) for each in told)
     assert any(f"{reached[1]} of the load reached" in each.words for each in told)
     assert told[-1].kind is Kind.FAILED
+
+
+def test_a_bar_stretched_sixfold_in_a_step_stays_on_its_side_of_its_planes_of_symmetry() -> None:
+    """Both transverse axes of the cell may turn inside out in a Newton step: det F is positive again."""
+    bulk = 4000.0
+
+    def transverse_force(across: float) -> float:
+        """Return ∂W/∂λ across, with stretches (6, λ, λ)."""
+        J = 6.0 * across**2
+        along, thin = 6.0 * J ** (-1 / 3), across * J ** (-1 / 3)
+        slope = [160 * stretch - 40 * stretch**-3 for stretch in (along, thin)]
+        return -2 / 3 * (slope[0] * along - slope[1] * thin) / across + bulk * (J - 1.0) * 12.0 * across
+
+    body = Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), Ogden((160.0, -40.0), (2.0, -2.0), bulk))
+    sides = {"x0": (0.0, None, None), "y0": (None, 0.0, None), "z0": (None, None, 0.0)}
+    held = [Support("bar", surface, value) for surface, value in sides.items()]
+    scene = Scene({"bar": body}, [*held, Support("bar", "x1", (5.0, None, None))])
+    moved = solve_scene(scene, MPI.COMM_SELF).gather_displacement("bar")
+    across = 1.0 + moved[:, 1:].min()
+    assert across == pytest.approx(brentq(transverse_force, 0.2, 0.9), rel=1e-6)
+    assert np.all(body.mesh.points[:, 1:] * (1.0 + moved[:, 1:]) >= 0.0)

@@ -103,7 +103,7 @@ def equilibrium(patch: Patch, u: np.ndarray, free: np.ndarray, load: np.ndarray)
             return u
         du = np.zeros(u.size)
         du[free] = spl.spsolve(found.stiffness[free][:, free].tocsc(), residual)
-        while patch.mechanics.least_jacobian(u + du) < 0.4 * found.least_jacobian:
+        while patch.mechanics.jacobians(u + du).min() < 0.4 * found.least_jacobian:
             du /= 2
         u += du
     raise AssertionError("Newton's method did not converge")

@@ -96,8 +96,8 @@ def test_the_least_jacobian_of_a_homogeneous_deformation_is_its_determinant(cell
     mesh = skew_patch(cell)
     patch = patch_of(Body(mesh, RUBBER))
     F = (np.eye(3) + 0.3 * np.sin(np.arange(9.0)).reshape(3, 3))[: mesh.dim, : mesh.dim]
-    found = patch.mechanics.least_jacobian(patch.deformed(F).ravel())
-    assert found == pytest.approx(np.linalg.det(F), rel=1e-12)
+    found = patch.mechanics.jacobians(patch.deformed(F).ravel())
+    assert found.min() == pytest.approx(np.linalg.det(F), rel=1e-12)
 
 
 def test_a_cell_turned_inside_out_shows_in_the_least_jacobian() -> None:
