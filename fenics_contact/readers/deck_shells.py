@@ -178,7 +178,7 @@ class _Incidences:
         corner = np.zeros(count, dtype=bool)
         corner[group[self.corner]] = True
         arm = deep[:, None] * across
-        middle = points[node] + self.offset[first, None] * arm
+        middle = points[node] - self.offset[first, None] * arm
         ends = start + np.arange(2 * count).reshape(2, count)
         inner = np.full(count, -1)
         inner[corner] = start + 2 * count + np.arange(np.count_nonzero(corner))

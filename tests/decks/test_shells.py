@@ -97,6 +97,17 @@ def test_plates_move_as_calculix_prints(case: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(moved[node], calculix, atol=1e-5 * np.abs(calculix).max())
 
 
+@pytest.mark.parametrize("offset", [0.5, -0.5, 0.2])
+def test_nodes_are_off_the_middle_of_a_shell_along_its_normal(offset: float, tmp_path: Path) -> None:
+    """At 0.5 they are on its top, as CalculiX writes the nodes of the solid: z from -4 to 0."""
+    (tmp_path / "shell.inp").write_text(
+        text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.", f", OFFSET={offset}")
+    )
+    (body,) = read_deck(tmp_path / "shell.inp").scene.bodies.values()
+    across = body.mesh.points[:, 2]
+    np.testing.assert_allclose([across.min(), across.max()], [-4 * (offset + 0.5), 4 * (0.5 - offset)])
+
+
 def triangles(facets: np.ndarray, corners: int) -> np.ndarray:
     """Two triangles of 3 or 6 nodes for each quadrilateral, whose centre is the node behind its fifth."""
     centre = facets[:, 4] + 1
