@@ -17,6 +17,7 @@ from fenics_contact._scene.loads import (
     Pressure,
     ThermalStrain,
     TotalForce,
+    Traction,
     centrifugal,
     gravity,
 )
@@ -47,7 +48,10 @@ class LoadBuilder:
                     each = instant.forces[mine, : built.deck.dim] * owned[:, None]
                     value: Any = force if force and owned.all() else NodeValues(mesh.points[inner], each)
                     found.append(PointForce(body, name, value))
-        pressures = {built.names.pressed[each.where]: each.value for each in instant.pressures}
+        pressed = [each for each in instant.pressures if not each.is_traction]
+        pressures = {built.names.pressed[each.where]: each.value for each in pressed}
+        for each in instant.pressures:
+            found += self._tractions(each) if each.is_traction and each.value else ()
         for name, value in pressures.items():
             if value:
                 bodies = [body for body, mesh in built.meshes.items() if name in mesh.surfaces]
@@ -58,6 +62,27 @@ class LoadBuilder:
             if driven.spread:
                 found += self._spread(driven, name, instant)
         return (*found, *self._heat(instant), *self._stressed())
+
+    def _tractions(self, load: DistributedLoad) -> Iterator[Load]:
+        """Yield a force per area along a direction, of TRSHR along the plane of the surface."""
+        name, dim, along = self.built.names.pressed[load.where], self.built.deck.dim, np.array(load.numbers)
+        if self.built.steps.large and load.card.name_of("FOLLOWER") != "NO":
+            raise load.error("a traction that turns with its surface is not read: give FOLLOWER=NO")
+        if along[dim:].any():
+            raise load.error(f"the direction of a plane body's traction must be in its plane, got {along}")
+        for body, mesh in self.built.meshes.items():
+            if name not in mesh.surfaces:
+                continue
+            direction = along[:dim]
+            if load.where[1] == "TRSHR":
+                corners = mesh.points[mesh.surfaces[name][:, :dim]]
+                spans = np.linalg.qr(np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 2))[0]
+                each = np.einsum("fik,fjk,j->fi", spans, spans, direction)
+                direction = each.mean(axis=0)
+                if np.abs(each - direction).max() > 1e-6 * np.abs(along).max() or not direction.any():
+                    raise load.error("TRSHR needs a plane surface, and a direction not across it: give TRVEC")
+            value = load.value * direction / np.linalg.norm(direction)
+            yield Traction(body, name, tuple(value.tolist()))
 
     def _stressed(self) -> Iterator[Load]:
         """Yield the initial stresses of bodies."""

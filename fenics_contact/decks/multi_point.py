@@ -94,9 +94,11 @@ def read_equations(cards: Sequence[Card], mesh: DeckMesh) -> list[Equation]:
                     raise card.error(f"needs {count} terms of node, component and factor", first)
                 entries += [entry for entry in card.rows[row] if entry]
             nodes = [mesh.nodes_named(token, card, row) for token in entries[: 3 * count : 3]]
-            several = [len(each) for each in nodes if len(each) != 1]
+            several = {len(each) for each in nodes} - {1}
             if len(several) > 1 or 0 in several:
-                raise card.error("needs nodes and at most one set, got more: write an equation for each", row)
+                raise card.error(
+                    f"its sets must have as many nodes, some, got {sorted(several)}: correct them", row
+                )
             numbers = [card.number(token, row) for token in entries[2 : 3 * count : 3]]
             parts = [card.whole(token, row) - 1 for token in entries[1 : 3 * count : 3]]
             if not all(0 <= part < 6 for part in parts):

@@ -314,7 +314,7 @@ class _Naming:
 
     def _faces(self, pressed: DistributedLoad) -> Faces:
         card, row = pressed.card, pressed.row
-        if len(pressed.where) == 2:
+        if card.name == "DLOAD":
             elements = self.mesh.elements_named(pressed.where[0], card, row)
             return self.mesh.faces_of(elements, pressed.where[1], card, row)
         given = self.mesh.surface_named(pressed.where[0], card, row)

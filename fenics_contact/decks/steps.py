@@ -123,9 +123,10 @@ class Ramp:
 
 @dataclass(frozen=True)
 class DistributedLoad(AtLine):
-    """A pressure on faces, or a load on volumes: acceleration, or the square of an angular velocity.
+    """A load on faces, or on volumes: acceleration, or the square of an angular velocity.
 
-    `where`: element set or element, and face or "GRAV" or "CENTRIF": ("TOP", "P2"); of a surface its name;
+    `where`: element set or element, and face or "GRAV" or "CENTRIF": ("TOP", "P2"); of a surface its name
+    alone with a pressure, or with "TRVEC" or "TRSHR", whose direction `numbers` are;
     `value`: at the time, or the aim of the step, and `start`, at its start; `by`: number of its amplitude.
     """
 
@@ -141,6 +142,11 @@ class DistributedLoad(AtLine):
     def on_volume(self) -> bool:
         """Whether it is a load on volumes."""
         return self.where[-1] in ("GRAV", "CENTRIF") and len(self.where) > 1
+
+    @property
+    def is_traction(self) -> bool:
+        """Whether it is a force per area along a direction."""
+        return self.where[-1] in ("TRVEC", "TRSHR") and len(self.where) > 1
 
     def at(self, clock: Clock) -> DistributedLoad:
         """Return it at a time."""
@@ -193,7 +199,7 @@ class Instant:
 
     @property
     def pressures(self) -> list[DistributedLoad]:
-        """The pressures on faces."""
+        """The pressures and tractions on faces."""
         return [each for each in self.acting if not each.on_volume]
 
     @property
@@ -531,9 +537,8 @@ def _distributed(card: Card, mesh: DeckMesh, by: int) -> Iterator[DistributedLoa
         where: tuple[str, ...] = plain(entries[0]), label
         if card.name == "DSLOAD":
             mesh.surface_named(where[0], card, row)
-            if label != "P" or not numbers:
-                raise card.error(f"a surface is loaded by P and a pressure, got {label!r}: give these", row)
-            where = where[:1]
+            _check_on_surface(card, row, label, numbers)
+            where = where[:1] if label == "P" else where
         elif label in ("GRAV", "CENTRIF"):
             _check_weight(card, row, label, numbers)
             mesh.weighed(where[0], card, row)
@@ -543,6 +548,15 @@ def _distributed(card: Card, mesh: DeckMesh, by: int) -> Iterator[DistributedLoa
         else:
             raise card.error(f"load {label!r} is not supported: give P1, P2, ..., GRAV or CENTRIF", row)
         yield DistributedLoad(card, row, where, numbers[0], numbers[1:], by)
+
+
+def _check_on_surface(card: Card, row: int, label: str, numbers: Sequence[float]) -> None:
+    """Reject loads on surfaces but pressures, and tractions without a direction."""
+    if label == "P" and numbers:
+        return
+    if label not in ("TRVEC", "TRSHR") or len(numbers) != 4 or not any(numbers[1:]):
+        needed = "P and a pressure, or by TRVEC or TRSHR, its size and a direction x, y, z"
+        raise card.error(f"a surface is loaded by {needed}, got {', '.join(card.rows[row][1:])!r}", row)
 
 
 def _check_weight(card: Card, row: int, label: str, numbers: Sequence[float]) -> None:

@@ -47,10 +47,12 @@ WITHOUT_EFFECT = {
     "SECTIONPRINT": "output",
     "FACEPRINT": "output",
     "MONITOR": "output",
+    "FILEFORMAT": "output",
     "TIMEPOINTS": "times of output",
     "RESTART": "output",
     "DAMAGEINITIATION": "damage that is printed alone",
     "SECTIONCONTROLS": "of hourglasses, which reduced integration has there",
+    "HOURGLASSSTIFFNESS": "of hourglasses, which reduced integration has there",
     "REFINEMESH": "solved on the mesh as it is given, where the other program refines it and solves again",
     "USEREFINEDMESH": "solved on the mesh as it is given",
     "DISTRIBUTIONTABLE": "names what the numbers of a *DISTRIBUTION are",
@@ -69,6 +71,12 @@ IDLE_PARAMETERS = {
     ("STEP", "EXTRAPOLATION"): "has no effect here (how the other program iterates)",
     ("STEP", "CONVERTSDI"): "has no effect here (how the other program iterates)",
     ("SOLIDSECTION", "CONTROLS"): "has no effect here (hourglasses)",
+    ("FRICTION", "SLIPTOLERANCE"): "has no effect here: friction sticks without slip",
+    ("DSLOAD", "CONSTANTRESULTANT"): "has no effect here, where areas stay as they are",
+    **{
+        ("STATIC", name): "has no effect here (how the other program iterates)"
+        for name in ("STABILIZE", "FACTOR", "ALLSDTOL", "CONTINUE")
+    },
 }
 #: Every card that is known.
 KNOWN = MATERIAL_CARDS | MESH_CARDS | MODEL_CARDS | STEP_CARDS | PRINT_CARDS | set(WITHOUT_EFFECT)
@@ -106,7 +114,7 @@ PARAMETERS: dict[str, set[str]] = {
     "CONTACTPAIR": {"INTERACTION", "TYPE", "ADJUST", "SMALLSLIDING"},
     "SURFACEINTERACTION": {"NAME"},
     "SURFACEBEHAVIOR": {"PRESSURE-OVERCLOSURE"},
-    "FRICTION": set(),
+    "FRICTION": {"SLIPTOLERANCE"},
     "CLEARANCE": {"MASTER", "SLAVE", "VALUE"},
     "TIE": {"NAME", "ADJUST", "POSITIONTOLERANCE", "CYCLICSYMMETRY"},
     "CYCLICSYMMETRYMODEL": {"N", "NGRAPH", "TIE", "ELSET"},
@@ -124,11 +132,11 @@ PARAMETERS: dict[str, set[str]] = {
     "CHANGEFRICTION": {"INTERACTION"},
     "CHANGESURFACEBEHAVIOR": {"INTERACTION"},
     "MODELCHANGE": {"TYPE", "REMOVE", "ADD"},
-    "STATIC": {"DIRECT", "SOLVER"},
+    "STATIC": {"DIRECT", "SOLVER", "STABILIZE", "FACTOR", "ALLSDTOL", "CONTINUE"},
     "BOUNDARY": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "FIXED", "TYPE"},
     "CLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
     "DLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
-    "DSLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
+    "DSLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "CONSTANTRESULTANT", "FOLLOWER"},
     "TEMPERATURE": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "LINTEMP"},
 }
 #: Cards that change what is solved, by what they are of.

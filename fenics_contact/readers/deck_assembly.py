@@ -13,11 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from fenics_contact.readers.deck_cards import Card, Instances, cards_of, plain, whole_numbers
+from fenics_contact.readers.deck_generated import with_generated
 from fenics_contact.readers.deck_parameters import with_parameters
 
 FRAMES = {"PART", "ENDPART", "ASSEMBLY", "ENDASSEMBLY", "INSTANCE", "ENDINSTANCE"}
 """The cards that make up the structure."""
-_IN_PARTS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "SOLIDSECTION", "SHELLSECTION", "ORIENTATION"}
+_IN_PARTS = {
+    "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "SOLIDSECTION", "SHELLSECTION", "ORIENTATION",
+    "HOURGLASSSTIFFNESS",
+}  # fmt: skip
 #: Parameters that name what belongs to a part.
 _NAMES = {
     "NODE": ("NSET",), "ELEMENT": ("ELSET",), "NSET": ("NSET", "ELSET"), "ELSET": ("ELSET",),
@@ -144,8 +148,9 @@ def in_one_piece(cards: Sequence[Card]) -> list[Card]:
     the assembly and behind it, which refer to such names or to ``INSTANCE.5``, keep their meaning.
     """
     if not any(card.name in FRAMES for card in cards):
-        return list(cards)
+        return with_generated(cards)
     deck = _sorted(cards)
+    deck.parts = {name: with_generated(own) for name, own in deck.parts.items()}
     parts = [*deck.parts.values(), *(each.own for each in deck.instances.values())]
     every = (*(card for part in parts for card in part), *deck.before, *deck.assembly, *deck.after)
     numbered = [whole_numbers(card) for card in every if card.name in ("NODE", "ELEMENT")]
@@ -207,7 +212,7 @@ def _of_instance(card: Card, instance: _Instance, instances: Instances) -> Card:
     if card.name not in _IN_PARTS:
         raise card.error("this card is not supported within a part: give it in the assembly or behind it")
     parameters, offset = dict(card.parameters), instances.offset(instance.name)
-    for name in _NAMES[card.name]:
+    for name in _NAMES.get(card.name, ()):
         if plain(parameters.get(name, "")):
             parameters[name] = f"{instance.name}.{plain(parameters[name])}"
     if card.name in ("NODE", "ELEMENT"):

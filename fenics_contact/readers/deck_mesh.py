@@ -193,6 +193,20 @@ def _written(token: str) -> int:
     return min(int(token[:20]), np.iinfo(np.int64).max)
 
 
+def read_nodes(cards: Sequence[Card]) -> DeckMesh:
+    """Return the nodes of cards and the sets of these alone."""
+    with_nodes = [card for card in cards if card.name == "NODE"]
+    numbers, points, numbers_of = _nodes(with_nodes)
+    mesh = DeckMesh(numbers, points, [], np.zeros(0, dtype=np.int64))
+    for card, own in zip(with_nodes, numbers_of, strict=True):
+        if card.name_of("NSET"):
+            _add(mesh, mesh.node_sets, card, card.name_of("NSET"), mesh.positions(own, "node", card))
+    for card in cards:
+        if card.name == "NSET" and not card.name_of("ELSET"):
+            _add(mesh, mesh.node_sets, card, card.required("NSET"), _members(mesh, card, "node"))
+    return mesh
+
+
 def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
     """Return nodes, elements, sets and surfaces of a deck."""
     with_nodes = [card for card in cards if card.name == "NODE"]
@@ -337,10 +351,27 @@ def _surface(mesh: DeckMesh, card: Card) -> Named:
     for k, row in enumerate(card.rows):
         elements = mesh.elements_named(row[0], card, k)
         label = row[1].upper() if len(row) > 1 else ""
+        if not label:
+            parts.append(_outer(mesh, elements))
+            continue
         if label[:1] != "S":
-            raise card.error(f"needs a face S1, S2, ... behind the elements, got {label or 'nothing'!r}", k)
+            raise card.error(f"needs a face S1, S2, ... behind the elements, got {label!r}", k)
         parts.append(mesh.faces_of(elements, label, card, k))
     return Named(card, joined(parts), NO_NODES)
+
+
+def _outer(mesh: DeckMesh, elements: np.ndarray) -> Faces:
+    """Return the faces of elements that no other element of the deck shares, as in Abaqus."""
+    sides = np.array([len(block.element.faces) for block in mesh.blocks])[mesh.block_of]
+    every = np.repeat(np.arange(len(sides)), sides)
+    faces = Faces(every, np.arange(len(every)) - np.repeat(np.cumsum(sides) - sides, sides))
+    corners = np.full((len(faces), 4), -1)
+    for at, element, side, nodes in mesh.parts_of(faces):
+        own = nodes[:, : len(element.faces[side])]
+        corners[at, : own.shape[1]] = np.sort(own, axis=1)
+    _, group, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
+    mine = np.isin(every, elements) & (count[group.ravel()] == 1) & (corners[:, 0] >= 0)
+    return Faces(faces.elements[mine], faces.sides[mine])
 
 
 def joined(parts: Iterable[Faces]) -> Faces:

@@ -269,7 +269,7 @@ WRONG = [
     ("*BOUNDARY\n17, 4, 4, 0.1\n", r"17 has no rotation that can be prescribed"),
     ("*BOUNDARY\n501, 1\n*EQUATION\n1\n501, 1, 1.\n", r"needs a node of an element"),
     ("*EQUATION\n2\n17, 1, 1.\n", r"needs 2 terms of node, component and factor"),
-    ("*EQUATION\n2\nBAR_X1, 1, 1., BAR_X0, 1, -1.\n", r"needs nodes and at most one set, got more"),
+    ("*NSET, NSET=TWO\n17, 18\n*EQUATION\n2\nBAR_X1, 1, 1., TWO, 1, -1.\n", r"sets must have as many nodes"),
     ("*EQUATION, REMOVE\n1\n", r"REMOVE is not read"),
     ("*TRANSFORM, NSET=BAR_X1, TYPE=S\n", r"needs TYPE=R or C and a line with two points"),
     (
