@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("names", nargs="*", help="decks without .inp, all by default")
     parser.add_argument("--folder", type=Path, default=FOLDER, help="where the decks are")
     parser.add_argument("--output", type=Path, default=Path("output/benchmarks/decks"))
-    parser.add_argument("--limit", type=float, default=120.0, help="longest time of a deck [s]")
+    parser.add_argument("--limit", type=float, default=120.0, help="processor seconds of a deck")
     parser.add_argument(
         "--refine", type=int, default=0, metavar="TIMES", help="cut each hexahedron into eight, so many times"
     )

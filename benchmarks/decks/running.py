@@ -106,13 +106,15 @@ def results_of(folder: Path, name: str, text: str) -> tuple[list[Block], float |
 
 @contextmanager
 def _at_most(limit: float) -> Iterator[None]:
-    def late(number: int, frame: FrameType | None) -> None:
-        raise TimeoutError(f"takes more than {limit:g} s")
+    """Allow so many processor seconds, in which the compiler of forms, which must not be cut, is not."""
 
-    before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, limit)
+    def late(number: int, frame: FrameType | None) -> None:
+        raise TimeoutError(f"takes more than {limit:g} processor seconds")
+
+    before = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, limit)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)

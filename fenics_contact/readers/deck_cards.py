@@ -321,7 +321,7 @@ def cards_of(path: Path) -> list[Card]:
             parts.append([stretch])
         elif stretch.lines and parts:
             parts[-1].append(stretch)
-        elif stretch.lines:
+        elif stretch.lines and any(line.partition(",")[0].strip().isdecimal() for line in stretch.lines):
             raise stretch.error(f"data must follow a card, got {stretch.lines[0].strip()[:40]!r}")
     return [_card(stretches) for stretches in parts]
 

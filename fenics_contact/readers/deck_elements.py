@@ -68,7 +68,7 @@ class Element:
 
     def side(self, label: str) -> int:
         """Return the position of the face that a label names, "S3" or "P3", −1 where there is none."""
-        place = int(label[1:]) - 1 if label[1:].isdecimal() else -1
+        place = int(label[1:]) - 1 if label[:1] in "SP" and label[1:].isdecimal() else -1
         return place if place < len(self.faces) else -1
 
     @cached_property
@@ -175,8 +175,8 @@ class Layer(Element):
         return _SIDES[label] if label in _SIDES else super().side(label)
 
 
-#: Faces of shells that have names; a pressure without a number acts on the first.
-_SIDES = {"SNEG": 0, "SPOS": 1, "P": 0}
+#: Faces of shells that have names, of edges those of Abaqus; a pressure without a number acts on the first.
+_SIDES = {"SNEG": 0, "SPOS": 1, "P": 0, "E1": 2, "E2": 3, "E3": 4, "E4": 5}
 #: Types of shells with the number of their nodes.
 _SHELLS = {"S3": 3, "S3R": 3, "S4": 4, "S4R": 4, "S6": 6, "S8": 8, "S8R": 8}
 

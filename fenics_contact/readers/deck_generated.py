@@ -1,4 +1,4 @@
-"""Nodes and elements that *NGEN, *NFILL and *ELGEN make of others, as cards that list them."""
+"""Nodes and elements that *NGEN, *NFILL and *ELGEN make of others, and nodes by angles, as plain cards."""
 
 from __future__ import annotations
 
@@ -48,6 +48,16 @@ def _listed(card: Card, name: str, rows: Sequence[tuple[int, Sequence[float]]], 
 def _nodes(card: Card, rows: Sequence[tuple[int, int, np.ndarray]]) -> list[Card]:
     given = {"NSET": card.name_of("NSET")} if card.name_of("NSET") else {}
     return [_listed(card, "NODE", [(row, (number, *at.tolist())) for row, number, at in rows], **given)]
+
+
+def _from_cylinder(card: Card, before: Sequence[Card]) -> list[Card]:
+    """Return nodes along x, y and z, those with SYSTEM=C of a radius, an angle in degrees and z."""
+    if card.name_of("SYSTEM") != "C":
+        return [card]
+    number, radius, angle, z = card.table(4).T
+    x, y = radius * np.cos(np.radians(angle)), radius * np.sin(np.radians(angle))
+    rows = np.column_stack([x, y, z])
+    return _nodes(card, [(k, int(n), at) for k, (n, at) in enumerate(zip(number, rows, strict=True))])
 
 
 def _along_lines(card: Card, before: Sequence[Card]) -> list[Card]:
@@ -148,6 +158,7 @@ def _element(before: Sequence[Card], card: Card, row: int, number: int) -> tuple
 
 #: What makes cards of another one and of those before it, and its parameters.
 _MADE: Mapping[str, tuple[Callable[[Card, Sequence[Card]], list[Card]], set[str]]] = {
+    "NODE": (_from_cylinder, {"NSET", "SYSTEM"}),
     "NGEN": (_along_lines, {"NSET", "LINE", "SYSTEM"}),
     "NFILL": (_between_sets, {"NSET"}),
     "ELGEN": (_in_rows, {"ELSET"}),

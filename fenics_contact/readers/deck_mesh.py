@@ -354,7 +354,7 @@ def _surface(mesh: DeckMesh, card: Card) -> Named:
         if not label:
             parts.append(_outer(mesh, elements))
             continue
-        if label[:1] != "S":
+        if label[:1] not in ("S", "E"):
             raise card.error(f"needs a face S1, S2, ... behind the elements, got {label!r}", k)
         parts.append(mesh.faces_of(elements, label, card, k))
     return Named(card, joined(parts), NO_NODES)

@@ -80,7 +80,9 @@ class _Depths:
                 varies[elements] = "NODALTHICKNESS" in card.parameters
                 given = card.floats(0) if card.lines else []
                 thickness[elements] = 1.0 if varies[elements].any() else _positive(card, 0, given)
-                offset[elements] = card.number_of("OFFSET")
+                sides = {"SPOS": 0.5, "SNEG": -0.5}
+                name = card.name_of("OFFSET")
+                offset[elements] = sides[name] if name in sides else card.number_of("OFFSET")
         found = cls(thickness, offset, by_node, varies)
         for place in places:
             found._check(mesh, mesh.blocks[place])

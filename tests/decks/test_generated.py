@@ -87,6 +87,16 @@ def test_arcs_are_divided_by_equal_angles(tmp_path: Path) -> None:
     assert set((angles / (np.pi / 8)).round(9)) == {0.0, 1.0, 2.0, 3.0, 4.0}
 
 
+def test_nodes_may_be_given_by_radius_and_angle(tmp_path: Path) -> None:
+    polar = RING.replace("*NODE\n", "*NODE, SYSTEM=C\n").replace("5, 0., 1.", "5, 1., 90.")
+    polar = polar.replace("45, 0., 3.", "45, 3., 90.")
+    rest = STEEL + SECTION + "1.,\n*BOUNDARY\nIN, 1, 2\n" + step("")
+    plain, turned = (
+        read_deck(deck(tmp_path, text + rest)).scene.bodies["BAR"].mesh.points for text in (RING, polar)
+    )
+    np.testing.assert_allclose(turned, plain, atol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("given", "other", "words"),
     [

@@ -66,6 +66,7 @@ SPELT = {
     "a title in the line of the heading": ("*NODE\n", "*HEADING a bar, 1 = one\n*NODE\n"),
     "an asterisk alone": ("*STATIC\n", "*STATIC\n*\n"),
     "blanks in front": ("*STATIC\n", "  ** quiet\n  *STATIC\n"),
+    "text in front of all cards": ("*NODE\n", ">**\n*NODE\n"),
     "a byte order mark": ("*NODE\n", "\ufeff*NODE\n"),
     "a name of a support": ("*BOUNDARY\n", "*BOUNDARY, NAME=ROOT\n"),
     "a request for messages": ("*STATIC\n", "*PRINT, CONTACT=YES\n*STATIC\n"),

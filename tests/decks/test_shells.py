@@ -97,15 +97,29 @@ def test_plates_move_as_calculix_prints(case: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(moved[node], calculix, atol=1e-5 * np.abs(calculix).max())
 
 
-@pytest.mark.parametrize("offset", [0.5, -0.5, 0.2])
-def test_nodes_are_off_the_middle_of_a_shell_along_its_normal(offset: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("given", "offset"), [("0.5", 0.5), ("-0.5", -0.5), ("0.2", 0.2), ("SNEG", -0.5), ("SPOS", 0.5)]
+)
+def test_nodes_are_off_the_middle_of_a_shell(given: str, offset: float, tmp_path: Path) -> None:
     """At 0.5 they are on its top, as CalculiX writes the nodes of the solid: z from -4 to 0."""
     (tmp_path / "shell.inp").write_text(
-        text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.", f", OFFSET={offset}")
+        text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.", f", OFFSET={given}")
     )
     (body,) = read_deck(tmp_path / "shell.inp").scene.bodies.values()
     across = body.mesh.points[:, 2]
     np.testing.assert_allclose([across.min(), across.max()], [-4 * (offset + 0.5), 4 * (0.5 - offset)])
+
+
+def test_edges_of_shells_are_named_as_in_abaqus_too(tmp_path: Path) -> None:
+    ends = []
+    for label in ("S4", "E2"):  # behind both sides the edge of the second and third corner
+        surface = f"*SURFACE, NAME=EDGE\n8, {label}\n"
+        loads = "*DSLOAD\nEDGE, P, 1."
+        text = text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, loads, model=surface)
+        (tmp_path / "shell.inp").write_text(text)
+        (mesh,) = (body.mesh for body in read_deck(tmp_path / "shell.inp").scene.bodies.values())
+        ends.append(np.unique(mesh.surfaces["EDGE"]))
+    np.testing.assert_array_equal(*ends)
 
 
 def triangles(facets: np.ndarray, corners: int) -> np.ndarray:
