@@ -128,7 +128,7 @@ class DeckCards:
             bolts=bolts,
             means=means,
             springs=read_springs(cards, mesh, materials),
-            masses=read_masses(cards, mesh),
+            masses=read_masses(cards, mesh, materials),
             equations=read_equations(cards, mesh),
             axes=read_axes(cards, mesh),
             interactions=interactions,
@@ -193,6 +193,13 @@ class DeckCards:
         for block in self.mesh.blocks:
             mark[block.nodes] = True
         return mark
+
+    def ends_at(self, node: int) -> np.ndarray:
+        """Return the nodes of elements whose mean an end of a spring is, none of one that has to be held."""
+        if self.inside[node]:
+            return np.array([node])
+        means = [each.nodes for each in self.means if each.node == node and not np.ptp(each.weights)]
+        return np.concatenate([self.mesh.shells.sides_at(node), *means])
 
     @cached_property
     def references(self) -> np.ndarray:

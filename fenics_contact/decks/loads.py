@@ -57,7 +57,7 @@ class LoadBuilder:
                 bodies = [body for body, mesh in built.meshes.items() if name in mesh.surfaces]
                 found += [Pressure(body, name, value) for body in bodies]
         for weight in instant.weights:
-            found += [*self._weights(weight), *self._of_masses(weight)]
+            found += [*self._weights(weight), *self._of_masses(weight, instant)]
         for driven, name in built.names.driven:
             if driven.spread:
                 found += self._spread(driven, name, instant)
@@ -121,24 +121,28 @@ class LoadBuilder:
         given = moment if np.any(moment) else None
         return [TotalForce(body, name, tuple(load[:dim]), given, at)] if any(load) else []
 
-    def _of_masses(self, weight: DistributedLoad) -> Iterator[Load]:
+    def _of_masses(self, weight: DistributedLoad, instant: Instant) -> Iterator[Load]:
         """Yield the weight, or the centrifugal force, of masses at nodes."""
         deck, dim = self.built.deck, self.built.deck.dim
         numbers = np.array(weight.numbers)
         for each in deck.masses if weight.value else ():
             if weight.where[0] not in each.sets:
                 continue
+            if not each.mass:
+                raise weight.error("the masses of its elements are zero: give *MASS, or trusses a *DENSITY")
             if weight.where[1] == "GRAV":
                 force = each.mass * weight.value * numbers / np.linalg.norm(numbers)
             else:
                 arm, along = deck.mesh.points[each.node] - numbers[:3], numbers[3:]
                 arm = arm - (arm @ along) * along / (along @ along)
                 force = each.mass * weight.value * arm
-            name = name_of(deck.mesh.numbers[each.node])
-            body = next((b for b, mesh in self.built.meshes.items() if name in mesh.node_sets), "")
-            if not body:
-                raise each.card.error(f"the mass at {name.lower()} needs a node of an element: give forces")
-            yield PointForce(body, name, tuple((force[:dim] / deck.thickness).tolist()))
+            name, nodes = name_of(deck.mesh.numbers[each.node]), deck.ends_at(each.node)
+            if not len(nodes):
+                if np.isnan(instant.held[each.node, :dim]).any():
+                    raise each.card.error(f"mass at {name.lower()}, of no element and not held: hold it")
+                continue  # its support alone carries it
+            body = next(b for b, mesh in self.built.meshes.items() if name in mesh.node_sets)
+            yield PointForce(body, name, tuple((force[:dim] / deck.thickness / len(nodes)).tolist()))
 
     def _weights(self, weight: DistributedLoad) -> Iterator[Load]:
         """Yield gravity or centrifugal force on bodies, by region where some are not loaded or differ."""

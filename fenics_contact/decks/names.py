@@ -263,11 +263,10 @@ class _Naming:
             if len(set(each.nodes)) == 1:
                 node = each.nodes[0]
                 self.node_sets[name_of(self.mesh.numbers[node])] = np.array([node])
-        ends = [node for each in self.deck.springs for node in each.nodes if self.deck.inside[node]]
+        ends = [node for each in self.deck.springs for node in each.nodes]
         for node in [*ends, *(each.node for each in self.deck.masses)]:
-            self.node_sets[name_of(self.mesh.numbers[node])] = np.array([node])
-        for mean in self.deck.means if self.deck.springs else ():
-            self.node_sets[name_of(self.mesh.numbers[mean.node])] = mean.nodes
+            if len(nodes := self.deck.ends_at(node)):
+                self.node_sets[name_of(self.mesh.numbers[node])] = np.unique(nodes)
 
     def pressed(self) -> dict[tuple[str, ...], str]:
         """Name the faces that pressures act on."""

@@ -181,24 +181,12 @@ class _Carrier:
             yield self._turns(mine, 3 + np.flatnonzero(pattern))
         number = np.repeat(np.flatnonzero(self._of_solids), 3)
         k = np.tile(np.arange(3), len(number) // 3)
-        nodes, middle = self.motions.nodes[number], self.motions.ends[number, 1]
-        yield Rows.of(self._local[6 * number + k], self._given(nodes, k))
-        bare = (middle >= 0) & ~self.motions.is_knot[number]
-        yield self._follows(middle[bare], nodes[bare], k[bare])
+        yield Rows.of(self._local[6 * number + k], self._given(self.motions.nodes[number], k))
 
     def _given(self, nodes: np.ndarray, components: np.ndarray) -> sp.csr_matrix:
         """Return the matrix that takes one component of a node of the deck in each row, (n, 6 n_nodes)."""
         shape = len(nodes), 6 * len(self.deck.mesh.points)
         return sp.csr_matrix((np.ones(len(nodes)), (np.arange(len(nodes)), 6 * nodes + components)), shape)
-
-    def _follows(self, inner: np.ndarray, nodes: np.ndarray, k: np.ndarray) -> Rows:
-        """Return that single nodes move with those of the deck along axes of these."""
-        along = np.eye(3)[k]
-        for place in np.flatnonzero(self.deck.axes.turned(nodes)):
-            along[place] = self.deck.axes.of(int(nodes[place]))[k[place]]
-        columns, row = 3 * inner[:, None] + np.arange(3), np.repeat(np.arange(len(inner)), 3)
-        shape = len(inner), 3 * len(self.deck.mesh.points)
-        return Rows.of(sp.csr_matrix((along.ravel(), (row, columns.ravel())), shape), self._given(nodes, k))
 
     def _turns(self, number: np.ndarray, components: np.ndarray, least: float = 0.1) -> Rows:
         """Return the equations of rotations of nodes.

@@ -17,7 +17,7 @@ def springs_of(built: DeckBodies) -> list[Spring]:
 
 def _spring(of: NodeSpring, built: DeckBodies) -> Spring:
     deck = built.deck
-    members = [_members(node, built) for node in of.nodes]
+    members = [deck.ends_at(node) for node in of.nodes]
     ends = [(place, nodes) for place, nodes in enumerate(members) if len(nodes)]
     if not ends:
         raise of.error("joins nodes without elements, which is not solved here: mesh these as solids")
@@ -38,12 +38,6 @@ def _spring(of: NodeSpring, built: DeckBodies) -> Spring:
     # The line is that between the nodes of the deck, also where the end is the mean of others.
     fixed = moved[0] + points[len(points) - 1 - place] - points[place]
     return Spring(surfaces[0], tuple(fixed.tolist()), stiffness, name=f"ELEMENT {of.link.number}")
-
-
-def _members(node: int, built: DeckBodies) -> np.ndarray:
-    """Return the nodes of elements whose mean an end is, none of one that has to be held."""
-    means = [each.nodes for each in built.deck.means if each.node == node and not np.ptp(each.weights)]
-    return np.array([node]) if built.deck.inside[node] else np.concatenate([np.zeros(0, dtype=int), *means])
 
 
 def _surface(of: NodeSpring, node: int, nodes: np.ndarray, built: DeckBodies) -> Surface:

@@ -75,11 +75,15 @@ def _given(
         if card.name == "SPRING" and link.kind.startswith("SPRING"):
             yield link, _constant(card), -1 if link.kind == "SPRINGA" else _component(card)
         elif card.name == "SOLIDSECTION" and link.kind.startswith("T"):
-            area = card.floats(0)[0] if card.lines and card.rows[0][0] else 1.0
             material = card.known("material", card.required("MATERIAL"), materials)
             if set(material.parts) - {"ELASTIC", "DENSITY", "EXPANSION"} or "ELASTIC" not in material.parts:
                 raise card.error("a truss needs a material of *ELASTIC alone: give one")
-            yield link, area * row_at(material.parts["ELASTIC"], 2, 0.0, "a Young's modulus")[0], -1
+            yield link, _area(card) * row_at(material.parts["ELASTIC"], 2, 0.0, "a Young's modulus")[0], -1
+
+
+def _area(card: Card) -> float:
+    """Return that of the section of a truss."""
+    return card.floats(0)[0] if card.lines and card.rows[0][0] else 1.0
 
 
 def _constant(card: Card) -> float:
@@ -106,13 +110,22 @@ def _component(card: Card) -> int:
     return parts.pop() - 1
 
 
-def read_masses(cards: Sequence[Card], mesh: DeckMesh) -> list[NodeMass]:
-    """Return the masses at nodes of a deck."""
+def read_masses(
+    cards: Sequence[Card], mesh: DeckMesh, materials: Mapping[str, MaterialCards]
+) -> list[NodeMass]:
+    """Return the masses at nodes of a deck; those of trusses are at their ends."""
     found = []
     for card in cards:
-        for link in mesh.link_sets.get(card.required("ELSET"), []) if card.name == "MASS" else ():
-            if link.kind == "MASS":
-                sets = frozenset(name for name, links in mesh.link_sets.items() if link in links)
-                node = int(mesh.positions(np.array(link.nodes), "node", link.card, link.row)[0])
-                found.append(NodeMass(link.card, node, card.floats(0)[0], sets))
+        for link in mesh.link_sets.get(card.name_of("ELSET"), []):
+            ends = mesh.positions(np.array(link.nodes)[[0, -1]], "node", link.card, link.row)
+            if card.name == "MASS" and link.kind == "MASS":
+                ends, mass = ends[:1], card.floats(0)[0]
+            elif card.name == "SOLIDSECTION" and link.kind.startswith("T"):
+                density = card.known("material", card.required("MATERIAL"), materials).density
+                length = float(np.linalg.norm(np.diff(mesh.points[ends], axis=0)))
+                mass = 0.5 * _area(card) * length * density
+            else:
+                continue
+            sets = frozenset(name for name, links in mesh.link_sets.items() if link in links)
+            found += [NodeMass(link.card, node, mass, sets) for node in ends.tolist()]
     return found

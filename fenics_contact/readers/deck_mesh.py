@@ -101,15 +101,9 @@ class DeckMesh:
         return card.known("element set", plain(token), self.element_sets, row)
 
     def weighed(self, token: str, card: Card, row: int | None = None) -> np.ndarray:
-        """Return the positions of the elements that a load on volumes acts on, none of a set of masses."""
-        links = self.link_sets.get(plain(token), [])
-        if any(link.kind.startswith("T") for link in links):
-            raise card.error(f"trusses have no weight here, {plain(token)!r} has some: give forces", row)
-        return (
-            NO_NODES
-            if links and plain(token) not in self.element_sets
-            else self.elements_named(token, card, row)
-        )
+        """Return the positions of the cells that a load on volumes acts on, none of a set of masses."""
+        alone = plain(token) in self.link_sets and plain(token) not in self.element_sets
+        return NO_NODES if alone else self.elements_named(token, card, row)
 
     def surface_named(self, token: str, card: Card, row: int | None = None) -> Named:
         """Return a surface, which has faces or nodes."""

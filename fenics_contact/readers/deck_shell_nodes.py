@@ -25,6 +25,13 @@ class ShellNodes:
         """Which nodes the deck has not, (n,)."""
         return np.asarray(self.sources[:, 0] != self.sources[:, 1])
 
+    def sides_at(self, node: int) -> np.ndarray:
+        """Return the nodes at the bottom and on top whose mean the motion of a node is, none of others.
+
+        At knots those of one shell are enough, as all turn about the node.
+        """
+        return self.ends[(self.sources == node).all(axis=1)][:1, [0, 2]].ravel()
+
     def across(self, nodes: np.ndarray) -> np.ndarray:
         """Return nodes with those across the thickness in place of nodes of shells, ascending."""
         mine = self.ends[np.isin(self.sources, nodes).all(axis=1)]

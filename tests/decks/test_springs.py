@@ -79,6 +79,20 @@ def test_masses_weigh_and_fly(tmp_path: Path) -> None:
     assert end(tmp_path, masses, spin) == pytest.approx(4.0 * 25.0 * 5.0 / K, rel=1e-8)
 
 
+@pytest.mark.parametrize("kind", ["T3D2", "T3D3"])
+def test_half_of_a_truss_weighs_on_each_end(tmp_path: Path, kind: str) -> None:
+    """ρ A L g / 2 over E A / L of the bar and of the truss; the held end carries the other half."""
+    middle = "502, " if kind == "T3D3" else ""
+    truss = f"*ELEMENT, TYPE={kind}, ELSET=S\n101, 17, {middle}501\n*SOLID SECTION, ELSET=S, MATERIAL=STEEL\n"
+    weight = 7.85e-9 * 3.0 * 2.0 * 1e10 / 2.0
+    cards = (
+        truss.replace("MATERIAL=STEEL", "MATERIAL=HEAVY")
+        + "3.\n*MATERIAL, NAME=HEAVY\n*ELASTIC\n210000., 0.\n"
+    )
+    moved = end(tmp_path, cards + "*DENSITY\n7.85e-9\n", "*DLOAD\nS, GRAV, 1e10, 1., 0., 0.\n")
+    assert moved == pytest.approx(weight / (K + 210000.0 * 3.0 / 2.0), rel=1e-8)
+
+
 @pytest.mark.parametrize(
     ("cards", "words"),
     [
@@ -97,12 +111,12 @@ def test_masses_weigh_and_fly(tmp_path: Path) -> None:
         (
             "*ELEMENT, TYPE=T3D2, ELSET=S\n101, 17, 501\n*SOLID SECTION, ELSET=S, MATERIAL=STEEL\n1.\n"
             + step("*DLOAD\nS, GRAV, 9., 1., 0., 0.\n"),
-            "trusses have no weight here, 'S' has some",
+            "the masses of its elements are zero",
         ),
         (
             "*NODE\n700, 0., 0., 9.\n*ELEMENT, TYPE=MASS, ELSET=M\n101, 700\n*MASS, ELSET=M\n2.\n"
             + step("*DLOAD\nM, GRAV, 9., 1., 0., 0.\n"),
-            "the mass at node 700 needs a node of an element",
+            "mass at node 700, of no element and not held: hold it",
         ),
     ],
 )
