@@ -18,7 +18,7 @@ from fenics_contact._fem.templates import (
     Written,
     coefficient_shape,
     polynomial,
-    volume_measure,
+    stiffness_measure,
 )
 from fenics_contact._kinematics.element import Element
 from fenics_contact.materials.elastic import Material
@@ -98,7 +98,7 @@ def _written(kind: str, materials: tuple[Material, ...], element: Element) -> Wr
         power = {"cell pressure": 0, "bulk modulus": -3}.get(kind, 3)
         return None if part is None else stretch**power * on_stretched(part, element)
 
-    form, constants = integrate(materials, element, integrand, volume_measure(element))
+    form, constants = integrate(materials, element, integrand, stiffness_measure(element))
     coefficients = (u, means, pressures, centre)
     return form, constants, (*coefficients, change) if any(map(heat_expands, materials)) else coefficients
 

@@ -37,7 +37,7 @@ from fenics_contact._fem.templates import (
     Written,
     scalar_constants,
     stiffness_form,
-    volume_measure,
+    stiffness_measure,
 )
 from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.fields import Ufl, evaluate
@@ -191,7 +191,7 @@ class FormLibrary:
             V = element.displacements
             u, v = element.in_space(ufl.TrialFunction(V), ufl.TestFunction(V))
             form, constants = integrate(
-                materials, element, lambda m, c: m.stiffness(u, v, c), volume_measure(element)
+                materials, element, lambda m, c: m.stiffness(u, v, c), stiffness_measure(element)
             )
             return stiffness_form(form, element), constants, ()
 

@@ -177,6 +177,12 @@ def volume_measure(element: Element, degree: int | None = None) -> ufl.Measure:
     return ufl.dx(domain=element.template, metadata=metadata)
 
 
+def stiffness_measure(element: Element) -> ufl.Measure:
+    """Return dx on the template with the points at which stiffnesses are evaluated."""
+    degree, order = quadrature_degree(element), element.cell.order
+    return ufl.dx(domain=element.template, metadata=element.integration.metadata(degree, order))
+
+
 def stiffness_form(form: ufl.Form, element: Element) -> ufl.Form:
     """Return a stiffness by the integration of an element."""
     degree = quadrature_degree(replace(element, integration=FULL))

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 if TYPE_CHECKING:
     import ufl
@@ -21,6 +24,10 @@ class Integration:
     def degree(self, linear: int, order: int) -> int:
         """Return the degree of the quadrature by that of linear cells and the order of the cells."""
         return linear * order
+
+    def metadata(self, degree: int, order: int) -> dict[str, Any]:
+        """Return where a stiffness is evaluated, for UFL; `degree`: of other integrals on the cells."""
+        return {"quadrature_degree": degree}
 
     def stiffness(self, form: ufl.Form, in_full: Callable[[ufl.Form], ufl.Form]) -> ufl.Form:
         """Return a stiffness (UFL) by this integration, of one that has its degree.
@@ -62,7 +69,37 @@ class Stabilised(Reduced):
         return (1.0 - self.share) * form + self.share * in_full(form)
 
 
+@dataclass(frozen=True)
+class OfPrisms(Integration):
+    """Prisms by 9 points, linear ones by 2, as in CalculiX: of the least degree that holds all their motions.
+
+    A prism is a hexahedron with an edge at y = 1 of no length, see `mesh.collapsed`: positions are those in
+    the cube, weights those in the prism over 1 − y, the Jacobian of that map.
+    """
+
+    name = "reduced prisms"
+    has_hourglasses = True  # of hexahedra
+
+    def metadata(self, degree: int, order: int) -> dict[str, Any]:
+        """Return where a stiffness is evaluated; see `Integration.metadata`."""
+        points, weights = _of_prisms(order)
+        rule = {"quadrature_points": points, "quadrature_weights": weights}
+        return {"quadrature_rule": "custom", "quadrature_degree": degree, **rule}
+
+
+@cache  # UFL compares arrays by identity
+def _of_prisms(order: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return points of the triangle, of degree 2 or 1, times those across, of degree 5 or 3; and weights."""
+    flat, across = [(1 / 3, 1 / 3)], [(-(3**-0.5), 0.5), (3**-0.5, 0.5)]
+    if order == 2:
+        flat = [(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)]
+        across = [(-(0.6**0.5), 5 / 18), (0.0, 8 / 18), (0.6**0.5, 5 / 18)]
+    x, y, z, weight = np.array([(*at, *of) for at in flat for of in across]).T
+    return np.column_stack([x / (1 - y), y, 0.5 + 0.5 * z]), weight / (2 * len(flat) * (1 - y))
+
+
 FULL = Integration()
 REDUCED = Reduced()
 STABILISED = Stabilised()
+OF_PRISMS = OfPrisms()
 AT_SECTIONS = Stabilised(1e-6)

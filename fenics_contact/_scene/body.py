@@ -14,7 +14,14 @@ from fenics_contact._base.checks import GivenVector, brief, checked
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._kinematics.element import Element
-from fenics_contact._kinematics.integration import AT_SECTIONS, FULL, REDUCED, STABILISED, Integration
+from fenics_contact._kinematics.integration import (
+    AT_SECTIONS,
+    FULL,
+    OF_PRISMS,
+    REDUCED,
+    STABILISED,
+    Integration,
+)
 from fenics_contact._kinematics.revolution import Revolution
 from fenics_contact._kinematics.torsion import Torsion
 from fenics_contact._scene.effects import EffectName
@@ -25,7 +32,7 @@ from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite
 from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES
-from fenics_contact.mesh.collapsed import has_collapsed
+from fenics_contact.mesh.collapsed import has_collapsed, shapes_in
 from fenics_contact.mesh.faces import computed_rounding
 from fenics_contact.mesh.one_layer import touches_in_one_layer, two_wide
 
@@ -54,8 +61,9 @@ class Body:
             and CAX8R. They lock less in bending and near incompressibility, and deform in ways that cost no
             energy where a cell shares no face with another one: two cells in each direction are safe.
             "stabilised": the same with one thousandth of "full", for rows of single cells; "reduced" is that,
-            too, where contact or a tie acts on one layer of cells. Bodies that also have prisms, pyramids or
-            triangles are integrated in full.
+            too, where contact or a tie acts on one layer of cells. Of prisms alone "reduced" is 9 points, of
+            linear ones 2, as C3D15 and C3D6 have, unless materials have a history or depend on the mean
+            dilatation. Bodies of prisms and others, of pyramids or triangles are integrated in full.
 
     Example:
         >>> from fenics_contact.gallery import rectangle
@@ -126,12 +134,21 @@ class Body:
 
     def without_single_rows(self, partition: np.ndarray) -> np.ndarray:
         """Return a partition whose subdomains are two cells wide, where reduced integration needs that."""
-        return two_wide(self.mesh, partition) if self.integration == "reduced" else partition
+        rows = self.integration == "reduced" and not self._is_of_prisms
+        return two_wide(self.mesh, partition) if rows else partition
+
+    @property
+    def _is_of_prisms(self) -> bool:
+        """Whether it consists of prisms, of a body with reduced integration."""
+        return has_collapsed(self.mesh.cells[:1], self.mesh.dim)
 
     @property
     def _integration(self) -> Integration:
         if self.integration == "full":
             return FULL
+        if self._is_of_prisms:
+            whole = any(has_history(each) or has_mean_dilatation(each) for each in self.materials)
+            return FULL if whole else OF_PRISMS
         if self.integration == "stabilised" or touches_in_one_layer(self.mesh):
             return STABILISED
         return AT_SECTIONS if self.mesh.cuts else REDUCED
@@ -234,6 +251,8 @@ def _check_regions(mesh: BodyMesh, materials: Mapping[str, Material]) -> None:
 
 def _check_integration(mesh: BodyMesh, integration: str) -> None:
     words = "reduced integration needs hexahedra of 20 or quadrilaterals of 8 nodes"
+    if integration == "reduced" and set(shapes_in(mesh.cells, mesh.dim)) == {"prism"}:
+        return
     if integration != "full" and not mesh.centres:
         raise InvalidInputError(
             f"{words}, got {mesh.cells_in_words}, which deform without energy by it: leave it out, or take "

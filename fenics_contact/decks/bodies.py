@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -15,6 +15,8 @@ from fenics_contact.decks.materials import Conditions, build_material
 from fenics_contact.decks.names import Names
 from fenics_contact.decks.steps import DeckSteps
 from fenics_contact.materials.elastic import isotropic_constants
+from fenics_contact.materials.hyperelastic import has_mean_dilatation
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.one_layer import one_wide
 from fenics_contact.mesh.quality import AT_GAUSS_POINTS, jacobians, thickness
@@ -110,7 +112,7 @@ def _body(deck: DeckCards, steps: DeckSteps, parts: Parts, part: Component) -> B
         thick = section.thickness if len(deck.thicknesses) > 1 else None
         given[region] = _material(deck, section, replace(of, thickness=thick))
         _note_units(deck, section.card, given[region], mesh)
-    integration = _integration(deck, part, mesh)
+    integration = _integration(deck, part, mesh, given.values())
     _note_corners(deck, part, mesh)
     deck.record.origins["body", part.name] = deck.sections[part.sections[0]].card.origin
     return Body(
@@ -122,13 +124,17 @@ def _body(deck: DeckCards, steps: DeckSteps, parts: Parts, part: Component) -> B
 
 
 def _integration(
-    deck: DeckCards, part: Component, mesh: BodyMesh
+    deck: DeckCards, part: Component, mesh: BodyMesh, materials: Iterable[Any]
 ) -> Literal["full", "reduced", "stabilised"]:
     """Return how the elements of a body are integrated; rows of single cells of shells need some of full."""
     found = integration_of(deck.mesh, part, deck.note)
+    blocks = [deck.mesh.blocks[k] for k in np.unique(deck.mesh.block_of[part.elements])]
+    if found == "reduced" and blocks[0].element.shape == "wedge":
+        if any(has_history(each) or has_mean_dilatation(each) for each in materials):
+            deck.note(blocks[0].card, "prisms of such a material are integrated in full, by more points")
+        return found
     if found == "full" or not mesh.centres:
         return "full"
-    blocks = [deck.mesh.blocks[k] for k in np.unique(deck.mesh.block_of[part.elements])]
     layers = any(block.element.listed < block.element.count for block in blocks)
     return "stabilised" if layers and one_wide(mesh).any() else found
 

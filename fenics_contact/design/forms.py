@@ -21,6 +21,7 @@ from fenics_contact._fem.templates import (
     Templates,
     Written,
     scalar_constants,
+    stiffness_measure,
     volume_measure,
 )
 from fenics_contact._kinematics.element import Element
@@ -105,7 +106,7 @@ class ShapeForms:
                 materials,
                 element,
                 lambda m, c: _virtual_work(m, moved, along, c),
-                volume_measure(element),
+                stiffness_measure(element),
             )
             return _by_shape(form, element), constants, [u, w]
 

@@ -383,6 +383,8 @@ def integration_of(
 ) -> Literal["full", "reduced"]:
     """Return how the elements of a body are integrated, all alike."""
     blocks = [mesh.blocks[k] for k in np.unique(mesh.block_of[part.elements])]
+    if all(block.element.shape == "wedge" for block in blocks):
+        return "reduced"
     for block in blocks:
         element = block.element
         if count := {"C3D6": 2, "C3D15": 9, "CAX3": 2, "CAX6": 9}.get(element.name):

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact._kinematics.integration import FULL
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import quadratic, serendipity
+from fenics_contact.mesh import joined_cells, quadratic, serendipity
+from tests.decks.solved import solved
 from tests.decks.texts import STEEL, deck, mesh_cards
 from tests.fem.columns import COLUMN
+from tests.fem.mixed_cells import named_sides
 
 SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
 SOFT = STEEL.replace("210000.", "1000.")
@@ -103,6 +106,39 @@ def test_axes_are_given_by_coordinates(definition: str, tmp_path: Path) -> None:
             read_deck(path)
     else:
         assert "0.0, 1.0, 0.0" in repr(read_deck(path).scene.bodies["BAR"].materials[0])
+
+
+#: Columns of six prisms: what CalculiX 2.20 prints at a corner of the loaded end.
+PRISMS = {
+    "C3D6": (-9.312381e-02, 1.798957e-02, 3.485777e-01),
+    "C3D15": (-2.041202e-01, -3.830799e-03, 8.762649e-01),
+}
+
+
+def bent_prisms(element: str, law: str = "") -> str:
+    cut = block((0, 0, 0), (3, 1, 1), (3, 1, 1))
+    prisms = cut.cells[:, [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]]].reshape(-1, 6)
+    mesh = named_sides(cut.points, joined_cells({"prism": prisms}))
+    mesh = serendipity(quadratic(mesh)) if element == "C3D15" else mesh
+    text = mesh_cards({"BAR": mesh}) + SOFT + law + SECTION + "*BOUNDARY\nBAR_X0, 1, 3\n"
+    return text + "*STEP\n*STATIC\n*CLOAD\nBAR_X1, 3, 1.\n*END STEP\n"
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("element", PRISMS)
+def test_prisms_alone_have_the_points_of_calculix(element: str, tmp_path: Path) -> None:
+    text = bent_prisms(element)
+    assert f"TYPE={element}," in text
+    found, _, moved, places = solved(tmp_path, text, 1e-10)
+    assert not found.notes
+    corner = next(number for number, place in places.items() if np.allclose(place, (3, 1, 1)))
+    np.testing.assert_allclose(moved[corner], PRISMS[element], rtol=2e-6)
+
+
+def test_prisms_of_metals_are_integrated_in_full(tmp_path: Path) -> None:
+    found = read_deck(deck(tmp_path, bent_prisms("C3D15", "*PLASTIC\n100., 0.\n200., 1.\n")))
+    assert any("prisms of such a material are integrated in full" in note for note in found.notes)
+    assert found.scene.bodies["BAR"].element.integration == FULL
 
 
 @pytest.mark.parametrize(("element", "count"), [("CAX3", 2), ("CAX6", 9)])
