@@ -9,11 +9,12 @@ import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from fenics_contact._fem.templates import Constants, scalar_constants
+from fenics_contact._fem.templates import Constants, scalar_constants, stiffness_measure
 from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.body import Body
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
+from fenics_contact.materials.laminate import plies_of
 
 #: Builds an integrand (UFL) from a material and its constants, None for materials that are left out.
 OfMaterial = Callable[[Material, Constants], Expr | None]
@@ -67,16 +68,41 @@ def integrate(
     materials: tuple[Material, ...], element: Element, integrand: OfMaterial, measure: ufl.Measure
 ) -> tuple[ufl.Form, Constants]:
     """Return ∫ integrand over all materials (a form) and its constants."""
+    return _summed(materials, element, lambda material, own: [(integrand(material, own), measure)])
+
+
+def integrate_by_ply(
+    materials: tuple[Material, ...], element: Element, integrand: OfMaterial, measure: ufl.Measure
+) -> tuple[ufl.Form, Constants]:
+    """Return the same with each ply of laminates at the points of its own; `measure`: of others."""
+
+    def parts(material: Material, constants: Constants) -> list[tuple[Expr | None, ufl.Measure]]:
+        return [
+            (integrand(ply, own), stiffness_measure(element, where) if where else measure)
+            for ply, where, own in plies_of(material, constants)
+        ]
+
+    return _summed(materials, element, parts)
+
+
+def _summed(
+    materials: tuple[Material, ...],
+    element: Element,
+    parts: Callable[[Material, Constants], list[tuple[Expr | None, ufl.Measure]]],
+) -> tuple[ufl.Form, Constants]:
+    """Return the sum of integrals over all materials, and its constants."""
     all_constants: list[ufl.Constant] = []
     form = None
     for number, material in enumerate(materials):
         constants = scalar_constants(element, len(material.parameters))
         with user_code(f"the UFL of material {type(material).__name__}"):
-            density = integrand(material, constants)
-            if density is not None:
-                density = element.integrand(element.on_cells(density))
+            found = [
+                (element.integrand(element.on_cells(density)), measure)
+                for density, measure in parts(material, constants)
+                if density is not None
+            ]
         all_constants.extend(constants)
-        if density is not None:
+        for density, measure in found:
             part = density * (measure if len(materials) == 1 else measure(number + 1))
             form = part if form is None else form + part
     return form, tuple(all_constants)

@@ -14,7 +14,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import Composition, integrate, material_sets
+from fenics_contact._fem.composition import Composition, integrate_by_ply, material_sets
 from fenics_contact._fem.heated import on_stretched, thermal_split
 from fenics_contact._fem.load_forms import (
     FIRST_COUNT,
@@ -190,7 +190,7 @@ class FormLibrary:
         def write() -> Written:
             V = element.displacements
             u, v = element.in_space(ufl.TrialFunction(V), ufl.TestFunction(V))
-            form, constants = integrate(
+            form, constants = integrate_by_ply(
                 materials, element, lambda m, c: m.stiffness(u, v, c), stiffness_measure(element)
             )
             return stiffness_form(form, element), constants, ()

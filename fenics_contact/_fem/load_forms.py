@@ -10,7 +10,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
-from fenics_contact._fem.composition import Composition, integrate
+from fenics_contact._fem.composition import Composition, integrate_by_ply
 from fenics_contact._fem.templates import (
     LOADED,
     Constants,
@@ -144,7 +144,7 @@ def _thermal_work(
         work = value * ufl.inner(material.thermal_stress(constants), strain(along))
         return material.per_area(work, constants) if isinstance(material, Plate) else work
 
-    return integrate(materials, element, thermal, volume_measure(element, 2))
+    return integrate_by_ply(materials, element, thermal, volume_measure(element, 2))
 
 
 def _stress_work(

@@ -21,6 +21,7 @@ from fenics_contact._kinematics.element import Element
 from fenics_contact._kinematics.integration import FULL
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.ranks import on_root_then_bcast
+from fenics_contact.materials.laminate import Intervals
 from fenics_contact.mesh.cell_types import quadrature, shape_values
 from fenics_contact.mesh.quality import jacobians
 
@@ -177,10 +178,10 @@ def volume_measure(element: Element, degree: int | None = None) -> ufl.Measure:
     return ufl.dx(domain=element.template, metadata=metadata)
 
 
-def stiffness_measure(element: Element) -> ufl.Measure:
-    """Return dx on the template with the points at which stiffnesses are evaluated."""
+def stiffness_measure(element: Element, intervals: Intervals = ()) -> ufl.Measure:
+    """Return dx on the template with the points at which stiffnesses are evaluated, of plies by intervals."""
     degree, order = quadrature_degree(element), element.cell.order
-    return ufl.dx(domain=element.template, metadata=element.integration.metadata(degree, order))
+    return ufl.dx(domain=element.template, metadata=element.integration.metadata(degree, order, intervals))
 
 
 def stiffness_form(form: ufl.Form, element: Element) -> ufl.Form:
@@ -188,8 +189,10 @@ def stiffness_form(form: ufl.Form, element: Element) -> ufl.Form:
     degree = quadrature_degree(replace(element, integration=FULL))
 
     def in_full(form: ufl.Form) -> ufl.Form:
-        whole = {"quadrature_degree": degree}
-        return ufl.Form([integral.reconstruct(metadata=whole) for integral in form.integrals()])
+        of_plies = [integral.metadata().get("intervals", ()) for integral in form.integrals()]
+        whole = [FULL.metadata(degree, element.cell.order, where) for where in of_plies]
+        parts = zip(form.integrals(), whole, strict=True)
+        return ufl.Form([integral.reconstruct(metadata=metadata) for integral, metadata in parts])
 
     return element.integration.stiffness(form, in_full)
 

@@ -25,9 +25,23 @@ class Integration:
         """Return the degree of the quadrature by that of linear cells and the order of the cells."""
         return linear * order
 
-    def metadata(self, degree: int, order: int) -> dict[str, Any]:
-        """Return where a stiffness is evaluated, for UFL; `degree`: of other integrals on the cells."""
-        return {"quadrature_degree": degree}
+    def metadata(
+        self, degree: int, order: int, intervals: tuple[tuple[float, float], ...] = ()
+    ) -> dict[str, Any]:
+        """Return where a stiffness is evaluated, for UFL.
+
+        Args:
+            degree: Of other integrals on the cells.
+            order: Of the cells.
+            intervals: Parts of the third direction, from 0 to 1, in each of which two points lie; whole cells
+                where there are none.
+        """
+        if not intervals:
+            return {"quadrature_degree": degree}
+        places, weights = np.polynomial.legendre.leggauss(degree // 2 + 1)
+        line = list(zip(0.5 + 0.5 * places, 0.5 * weights, strict=True))
+        flat = tuple((x, y, a * b) for x, a in line for y, b in line)
+        return _custom(degree, flat, intervals, 2)
 
     def stiffness(self, form: ufl.Form, in_full: Callable[[ufl.Form], ufl.Form]) -> ufl.Form:
         """Return a stiffness (UFL) by this integration, of one that has its degree.
@@ -80,22 +94,35 @@ class OfPrisms(Integration):
     name = "reduced prisms"
     has_hourglasses = True  # of hexahedra
 
-    def metadata(self, degree: int, order: int) -> dict[str, Any]:
+    def metadata(
+        self, degree: int, order: int, intervals: tuple[tuple[float, float], ...] = ()
+    ) -> dict[str, Any]:
         """Return where a stiffness is evaluated; see `Integration.metadata`."""
-        points, weights = _of_prisms(order)
-        rule = {"quadrature_points": points, "quadrature_weights": weights}
-        return {"quadrature_rule": "custom", "quadrature_degree": degree, **rule}
+        at = ((1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)) if order == 2 else ((1 / 3, 1 / 3),)
+        flat = tuple((x / (1 - y), y, 0.5 / len(at) / (1 - y)) for x, y in at)
+        return _custom(degree, flat, intervals or ((0.0, 1.0),), 2 if intervals else order + 1)
 
 
-@cache  # UFL compares arrays by identity
-def _of_prisms(order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return points of the triangle, of degree 2 or 1, times those across, of degree 5 or 3; and weights."""
-    flat, across = [(1 / 3, 1 / 3)], [(-(3**-0.5), 0.5), (3**-0.5, 0.5)]
-    if order == 2:
-        flat = [(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)]
-        across = [(-(0.6**0.5), 5 / 18), (0.0, 8 / 18), (0.6**0.5, 5 / 18)]
-    x, y, z, weight = np.array([(*at, *of) for at in flat for of in across]).T
-    return np.column_stack([x / (1 - y), y, 0.5 + 0.5 * z]), weight / (2 * len(flat) * (1 - y))
+@cache
+def _custom(
+    degree: int,
+    flat: tuple[tuple[float, float, float], ...],
+    intervals: tuple[tuple[float, float], ...],
+    count: int,
+) -> dict[str, Any]:
+    """Return points and weights in the first two directions times `count` Gauss points in each interval."""
+    places, weights = np.polynomial.legendre.leggauss(count)
+    ends = np.array(intervals)[:, None]
+    across = ends @ (0.5 + 0.5 * np.array([-places, places])), 0.5 * np.diff(ends) * weights
+    z, deep = (each.ravel() for each in across)
+    x, y, wide = np.array(flat).T[:, :, None]
+    points = np.stack(np.broadcast_arrays(x, y, z), axis=2).reshape(-1, 3).tolist()
+    # Tuples are those of all their digits in UFL's signatures, arrays are not.
+    rule = {
+        "quadrature_points": tuple(map(tuple, points)),
+        "quadrature_weights": tuple((wide * deep).ravel().tolist()),
+    }
+    return {"quadrature_rule": "custom", "quadrature_degree": degree, "intervals": intervals, **rule}
 
 
 FULL = Integration()

@@ -15,7 +15,8 @@ from fenics_contact.decks.materials import Conditions, build_material
 from fenics_contact.decks.names import Names
 from fenics_contact.decks.steps import DeckSteps
 from fenics_contact.materials.elastic import isotropic_constants
-from fenics_contact.materials.hyperelastic import has_mean_dilatation
+from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlinear
+from fenics_contact.materials.laminate import Laminate
 from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.one_layer import one_wide
@@ -30,6 +31,7 @@ from fenics_contact.readers.deck_bodies import (
 )
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import MeshCards
+from fenics_contact.readers.deck_plies import Ply
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,15 +154,30 @@ def _only(values: np.ndarray) -> float | None:
 
 
 def _expands(deck: DeckCards, section: Section) -> bool:
-    return section.material in deck.materials and "EXPANSION" in deck.materials[section.material].parts
+    known = [deck.materials[ply.material] for ply in section.plies if ply.material in deck.materials]
+    return any("EXPANSION" in material.parts for material in known)
 
 
 def _material(deck: DeckCards, section: Section, of: Conditions) -> Any:
-    cards = section.card.known("material", section.material, deck.materials)
-    if section.orientation:
-        section.card.known("orientation", section.orientation, deck.orientations)
-    deck.record.origins["material", section.material] = cards.card.origin
-    return build_material(cards, deck.orientations.get(section.orientation), of)
+    built = [_of_ply(deck, section.card, ply, of) for ply in section.plies]
+    if not section.composite:
+        return built[0]
+    if any(is_nonlinear(each) for each in built):
+        raise section.card.error(
+            "COMPOSITE is for linear materials and small displacements: leave NLGEOM out"
+        )
+    deck.note(
+        section.card, "cells are of one piece across the plies; their stresses are those of the mean ply"
+    )
+    return Laminate.of(zip(built, (ply.thickness for ply in section.plies), strict=True))
+
+
+def _of_ply(deck: DeckCards, card: Card, ply: Ply, of: Conditions) -> Any:
+    cards = card.known("material", ply.material, deck.materials)
+    if ply.orientation:
+        card.known("orientation", ply.orientation, deck.orientations)
+    deck.record.origins["material", ply.material] = cards.card.origin
+    return build_material(cards, deck.orientations.get(ply.orientation), of)
 
 
 def _note_units(deck: DeckCards, card: Card, material: Any, mesh: BodyMesh) -> None:

@@ -161,12 +161,14 @@ class LoadBuilder:
                 yield self._weight(weight, part, density, region)
 
     def _density(self, weight: DistributedLoad, section: int) -> float:
-        name = self.built.deck.sections[section].material
-        density = self.built.deck.materials[name].density
-        if not density:
-            needed = f"{weight.where[1]} needs a *DENSITY of material {name}: add it"
-            raise weight.error(needed)
-        return density
+        plies, found = self.built.deck.sections[section].plies, 0.0
+        for ply in plies:
+            density = self.built.deck.materials[ply.material].density
+            if not density:
+                needed = f"{weight.where[1]} needs a *DENSITY of material {ply.material}: add it"
+                raise weight.error(needed)
+            found += density * ply.thickness / sum(each.thickness for each in plies)
+        return found
 
     def _check_direction(self, weight: DistributedLoad, numbers: np.ndarray) -> None:
         """Reject directions that plane bodies and bodies of revolution do not have."""

@@ -12,7 +12,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import integrate, material_sets
+from fenics_contact._fem.composition import integrate, integrate_by_ply, material_sets
 from fenics_contact._fem.forms import Temperature, stress_in_space, stress_left
 from fenics_contact._fem.load_forms import Symbol, load_key, load_name, load_work
 from fenics_contact._fem.templates import (
@@ -102,7 +102,7 @@ class ShapeForms:
         def write() -> Written:
             u, w = element.fields(2)
             moved, along = element.in_space(u, w)
-            form, constants = integrate(
+            form, constants = integrate_by_ply(
                 materials,
                 element,
                 lambda m, c: _virtual_work(m, moved, along, c),

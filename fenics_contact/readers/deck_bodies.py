@@ -21,6 +21,7 @@ from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, one_arra
 from fenics_contact.readers.deck_assembly import read_cards
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import NO_FACES, Block, DeckMesh, Faces, Named
+from fenics_contact.readers.deck_plies import Ply, plies_of
 from fenics_contact.readers.deck_shells import read_solid_mesh
 
 if TYPE_CHECKING:
@@ -29,13 +30,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """A section: elements, their material, its axes, and the thickness of plane ones."""
+    """A section: elements, their material, its axes, the thickness of plane ones, and its plies, if any."""
 
     card: Card
     name: str
     material: str
     orientation: str
     thickness: float
+    composite: Sequence[Ply] = ()
+
+    @property
+    def plies(self) -> Sequence[Ply]:
+        """Its materials and their axes, from the bottom of shells."""
+        return self.composite or (Ply(1.0, self.material, self.orientation),)
 
 
 #: Cards that give elements their material.
@@ -51,11 +58,12 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
         if card.name in SECTIONS and (name in mesh.element_sets or name not in mesh.link_sets):
             name = card.required("ELSET")
             of_element[mesh.elements_named(name, card)] = len(sections)
-            thick = card.floats(0)[0] if card.lines and card.rows[0][0] else 1.0
+            plies = plies_of(card)
+            thick = card.floats(0)[0] if card.lines and card.rows[0][0] and not plies else 1.0
             if not thick > 0:
                 raise card.error(f"the thickness must be above zero, got {thick:g}: correct it", 0)
-            material, axes = card.required("MATERIAL"), card.name_of("ORIENTATION")
-            sections.append(Section(card, name, material, axes, thick))
+            material = plies[0].material if plies else card.required("MATERIAL")
+            sections.append(Section(card, name, material, card.name_of("ORIENTATION"), thick, plies))
     lost = np.flatnonzero(of_element < 0)
     if len(lost):
         block = mesh.blocks[mesh.block_of[lost[0]]]

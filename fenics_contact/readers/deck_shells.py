@@ -15,6 +15,7 @@ from fenics_contact.mesh.thin_bodies import CORNERS, facet_normals, layer_cells,
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_elements import Layer
 from fenics_contact.readers.deck_mesh import Block, DeckMesh, read_mesh_cards
+from fenics_contact.readers.deck_plies import plies_of
 from fenics_contact.readers.deck_shell_nodes import ShellNodes
 
 
@@ -78,7 +79,8 @@ class _Depths:
                     number = card.label(mesh.element_numbers[elements[~shells[elements]][0]])
                     raise card.error(f"element {number} is no shell: give it a *SOLID SECTION")
                 varies[elements] = "NODALTHICKNESS" in card.parameters
-                given = card.floats(0) if card.lines else []
+                plies = plies_of(card)
+                given = [sum(p.thickness for p in plies)] if plies else card.floats(0) if card.lines else []
                 thickness[elements] = 1.0 if varies[elements].any() else _positive(card, 0, given)
                 sides = {"SPOS": 0.5, "SNEG": -0.5}
                 name = card.name_of("OFFSET")

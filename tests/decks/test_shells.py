@@ -291,7 +291,6 @@ PRESSED = text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.")
         ("*SHELL SECTION", "*SOLID SECTION", r"element 1 has no \*SHELL SECTION"),
         ("MATERIAL=M\n4.0", "MATERIAL=M, NODAL THICKNESS\n4.0", r"node \d+ has no \*NODAL THICKNESS"),
         ("*DLOAD", "*TEMPERATURE\nNALL, 20., 5.\n*DLOAD", "gradients of temperature across shells"),
-        ("MATERIAL=M\n4.0", "MATERIAL=M, COMPOSITE\n4.0", r"the parameter COMPOSITE is not read"),
         ("ALL, P, 1.", "ALL, P9, 1.", r"C3D20R has 6 faces, got 'P9'"),
         ("*DLOAD", "*CLOAD\n43, 6, 1.\n*DLOAD", r"node 43 has a moment about the normal of its shell"),
         ("*STEP\n", "*BOUNDARY\n43, 6, 6, 0.1\n*STEP\n", r"a rotation about the normal of a shell cannot"),
