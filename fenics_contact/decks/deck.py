@@ -192,6 +192,14 @@ class Deck:
         """Return numbers of nodes with those of the nodes across the thickness of shells, ascending."""
         return self._shells.across(nodes)
 
+    def on_shells(self, kind: str, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return values of a field of a file behind numbers of nodes, (n, 1 + k), on the nodes of shells."""
+        return self._shells.flat(kind, nodes, values)
+
+    def nodes_of_shells(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the numbers of the nodes of shells that nodes across their thickness belong to."""
+        return self._shells.owners(nodes)
+
     def _of_elements(self, where: str, state: State) -> np.ndarray:
         """Return the mean stresses of elements behind their numbers."""
         found = []
@@ -363,4 +371,6 @@ def _load_steps(
 def _print(step: int, card: Card) -> Print:
     where = card.name_of("NSET") or card.name_of("ELSET") or card.name_of("SURFACE")
     variables = tuple(entry.upper() for row in card.rows for entry in row if entry)
-    return Print(step, card.written, where, variables, card.name_of("TOTALS"), card.origin)
+    return Print(
+        step, card.written, where, variables, card.name_of("TOTALS"), card.name_of("OUTPUT"), card.origin
+    )

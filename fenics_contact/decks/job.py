@@ -145,7 +145,7 @@ def _solve(
     failures = list[Exception]()
     materials = list(dict.fromkeys(name for kind, name in deck.sources if kind == "material"))
     with ExitStack() as stack:
-        writer = stack.enter_context(writing(comm, files[".frd"], results.numbering.mesh, materials))
+        writer = stack.enter_context(writing(comm, files[".frd"], results.written, materials))
         for step, load in zip(deck.step_of, deck.steps, strict=True):
             try:
                 state = sequence.advance(load)

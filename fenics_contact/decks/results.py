@@ -62,6 +62,32 @@ class DeckResults:
         known = FrdMesh(mesh.numbers[used], mesh.points[used], cells)
         return BodyNumbers(self.deck.node_numbers, known, self.deck.thickness)
 
+    @cached_property
+    def is_flat(self) -> bool:
+        """Whether fields of shells are on their own nodes: the parameter of one card holds for all."""
+        return any(each.output == "2D" for each in self.deck.prints) and any(map(_is_layer, self._blocks))
+
+    @property
+    def _blocks(self) -> Sequence[Block]:
+        return self.deck.mesh.mesh.blocks
+
+    @cached_property
+    def written(self) -> FrdMesh:
+        """The mesh in the file: that of the deck, with nodes across shells unless it asks for these alone."""
+        solid = self.numbering.mesh
+        if not self.is_flat:
+            return solid
+        blocks = filter(has_type, self._blocks)
+        cells = [
+            FrdCells(2, block.numbers, self.deck.nodes_of_shells(each.nodes[:, _listed(block.element)]))
+            if _is_layer(block)
+            else each
+            for block, each in zip(blocks, solid.cells, strict=True)
+        ]
+        mesh = self.deck.mesh.mesh
+        used = np.unique(np.concatenate([each.nodes.ravel() for each in cells]))
+        return FrdMesh(used, mesh.points[np.searchsorted(mesh.numbers, used)], cells)
+
     def asked(self, step: int, card: str) -> list[Print]:
         """Return what cards of a kind ask for in a step: those of the last step that has some."""
         steps = [each.step for each in self.deck.prints if _plain(each) == card and each.step <= step]
@@ -95,6 +121,8 @@ class DeckResults:
             alone = np.setdiff1d(nodes, [*self.numbering.mesh.numbers, *self.shells_among(nodes)])
             if len(alone) and _plain(each) == "NODEPRINT":
                 found.append(f"{place}{len(alone)} nodes of {each.where} belong to no element: not printed")
+        if self.is_flat and self.deck.scene.contacts:
+            found.append("OUTPUT=2D: fields of contact are not written for nodes of shells")
         if not all(map(self._asked_fields, self.deck.step_of)):
             nothing = "where the deck asks for no known fields (*NODE FILE, *EL FILE)"
             found.append(f"{nothing}, displacements and stresses are written")
@@ -107,6 +135,7 @@ class DeckResults:
     def nodal(self, state: State, step: int) -> list[FrdField]:
         """Return the fields of a state in a step, those of sets for their nodes alone. Collective."""
         found = nodal_fields(state, self.numbering, self.fields(step))
+        found = [self._on_shells(each) for each in found] if self.is_flat else found
         chosen = {
             kind: self.deck.across_shells(np.concatenate([self.deck.node_sets[e.where] for e in some]))
             for card, kinds in self.kinds.items()
@@ -114,6 +143,11 @@ class DeckResults:
             if (some := self.asked(step, card)) and all(each.where in self.deck.node_sets for each in some)
         }
         return [_part(each, chosen[each.kind]) if each.kind in chosen else each for each in found]
+
+    def _on_shells(self, of: FrdField) -> FrdField:
+        rows = self.deck.on_shells(of.kind, of.numbers, of.values)
+        rows = rows[np.isin(rows[:, 0], self.written.numbers)]
+        return FrdField(of.kind, rows[:, 0].astype(np.int64), rows[:, 1:])
 
     def printout(self, state: State, step: int, time: float) -> str:
         """Return the tables of the printed file of a state. Collective."""
@@ -131,6 +165,17 @@ class DeckResults:
 def has_type(block: Block) -> bool:
     """Return whether elements are among the types of cells that files have."""
     return (block.element.dim, len(block.element.written)) in FrdCells.kinds
+
+
+def _is_layer(block: Block) -> bool:
+    """Return whether elements are those that shells have become."""
+    return block.element.listed < block.element.count
+
+
+def _listed(element: Element) -> list[int]:
+    """Return the nodes at the bottom of such elements, in the order of the shells."""
+    width = 3 if element.listed in (3, 6) else 4
+    return [*range(width), *range(2 * width, 3 * width)][: element.listed]
 
 
 def _plain(asked: Print) -> str:

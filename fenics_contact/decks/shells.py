@@ -330,6 +330,29 @@ class ShellPrints:
         found = np.einsum("nk,nkd->nd", weights, values[place[mine]])
         return np.vstack([self._own(nodes, values), np.column_stack([self.sources[mine, 0], found])])
 
+    def flat(self, kind: str, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return values of a field of files behind numbers of nodes, (n, 1 + k), as CalculiX's `OUTPUT=2D`.
+
+        Of nodes across shells forces are added up, and means are weighted as displacements, also at nodes
+        of solids; contact is left out.
+        """
+        own = self._own(nodes, values)
+        if kind == "CONTACT":
+            return own
+        rows = self.summed(nodes, values) if kind == "FORC" else self.moved(nodes, values)
+        if kind != "FORC":
+            rows = rows[(np.arange(len(rows)) >= len(own)) | ~np.isin(rows[:, 0], self.sources)]
+        numbers, number = np.unique(rows[:, 0], return_inverse=True)
+        sums = np.stack([np.bincount(number.ravel(), column) for column in rows[:, 1:].T], axis=1)
+        counts = np.ones(len(numbers)) if kind == "FORC" else np.bincount(number.ravel())
+        return np.column_stack([numbers, sums / counts[:, None]])
+
+    def owners(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the numbers of the nodes of shells that nodes across belong to, same shape."""
+        order = np.argsort(self.ends, axis=None)
+        found = order[np.searchsorted(self.ends.ravel()[order], nodes)]
+        return np.asarray(self.sources[found // 3, 0])
+
     def summed(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Return forces on nodes of a body behind their numbers in the deck, (n, 1 + dim), of shells sums."""
         place, there = self._across(nodes)

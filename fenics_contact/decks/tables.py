@@ -24,6 +24,7 @@ class Print:
         where: Set of nodes or elements, or surface; "" for all.
         variables: "U", "RF", "S", ...
         totals: Whether sums over the set are asked for: "", "YES" or "ONLY".
+        output: "2D" for results on the nodes of shells, "3D" or "" for those across their thickness.
     """
 
     step: int
@@ -31,6 +32,7 @@ class Print:
     where: str
     variables: tuple[str, ...]
     totals: str
+    output: str
     origin: Origin
 
 

@@ -382,3 +382,34 @@ def test_jobs_print_displacements_of_the_nodes_of_shells(tmp_path: Path) -> None
     across = deck.across_shells(np.array([TIP + 1]))
     assert len(across) == 4
     assert across[0] == TIP + 1
+
+
+#: What CalculiX 2.20 writes at the loaded node and at one in the middle of an edge with OUTPUT=2D.
+FLAT = {
+    "DISP": [(7.72634e-03, 0, 2.77204e-01), (4.21727e-03, -1.80011e-04, 2.76979e-01)],
+    "STRESS": [(92.1734, 41.7154, 39.0109), (24.999, 13.5273, 9.57839)],
+    "TOSTRAIN": [(3.39777e-04, 1.18003e-05, -5.77843e-06), (9.03365e-05, 1.57702e-05, -9.89741e-06)],
+    "FORC": [(2000.0, 0, -16.6667), (0, 0, 33.3333)],
+}
+
+
+@pytest.mark.parametrize("kind", ["S8R", "S6", "S4"])
+def test_jobs_write_fields_on_the_nodes_of_shells(kind: str, tmp_path: Path) -> None:
+    facets = {"S8R": PLATE[1], "S6": triangles(PLATE[1], 6), "S4": PLATE[1][:, :4]}[kind]
+    loads = f"*DLOAD\nALL, P, 1.\n*CLOAD\n{TIP + 1}, 1, 2000.\n*NODE FILE, OUTPUT=2D\nU, RF\n*EL FILE\nS, E"
+    (tmp_path / "shell.inp").write_text(text_of(PLATE[0], {kind: facets}, CLAMPED, loads))
+    run_job(tmp_path / "shell.inp", MPI.COMM_SELF, tolerance=1e-9)
+    nodes, *fields = (tmp_path / "shell.frd").read_text().split(" -4  ")
+    cells = [line.split() for line in nodes.split("    3C")[1].splitlines()]
+    assert [list(map(int, line[1:])) for line in cells if line[0] == "-2"] == (facets + 1).tolist()
+    assert {line[2] for line in cells if line[0] == "-1"} == {{"S8R": "10", "S6": "8", "S4": "9"}[kind]}
+    for field in fields:
+        values = {
+            int(line[3:13]): [float(line[13 + 12 * k : 25 + 12 * k]) for k in range(3)]
+            for line in field.splitlines()
+            if line.startswith(" -1")
+        }
+        assert sorted(values) == (np.unique(facets) + 1).tolist()
+        for node, calculix in zip((TIP, BESIDE), FLAT[field.split()[0]], strict=True):
+            if kind == "S8R":
+                np.testing.assert_allclose(values[node + 1], calculix, atol=1e-4 * np.abs(calculix).max())
