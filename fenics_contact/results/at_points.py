@@ -18,13 +18,14 @@ from fenics_contact._fem.forms import temperature_of
 from fenics_contact._fem.templates import quadrature_degree, volume_measure
 from fenics_contact._kinematics.base import Gradients
 from fenics_contact._kinematics.element import Element
+from fenics_contact._kinematics.integration import OF_PRISMS
 from fenics_contact._scene.body import Body
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CellType, quadrature, shape_gradients, shape_values
-from fenics_contact.mesh.collapsed import as_hexahedra, by_shape, collapse, places_of
+from fenics_contact.mesh.collapsed import SHAPES, as_hexahedra, by_shape, collapse, places_of
 from fenics_contact.mesh.quality import determinants
 from fenics_contact.results.fields import CellStress, cells_of_body, tensors
 
@@ -71,7 +72,8 @@ class PointFields:
         """Return values at nodes: those of each cell extrapolated to its nodes, then the mean over cells.
 
         As CalculiX does: 8 Gauss points by the trilinear function that they determine, 27 by the triquadratic
-        one, 4 points of tetrahedra by the linear one; means over all materials.
+        one, 4 points of tetrahedra by the linear one, 9 of prisms by the function nearest to them that is
+        linear in the triangle and across; means over all materials.
 
         Args:
             values: At the points, shape (n_cells, n_points, ...).
@@ -83,12 +85,29 @@ class PointFields:
         matrix, flat = self.to(self._cell.nodes), values.reshape(*values.shape[:2], -1)
         total, count = np.zeros((mesh.n_nodes, flat.shape[2])), np.zeros(mesh.n_nodes)
         for name, (mine, nodes) in by_shape(mesh.cells, mesh.dim).items():
-            own = _own_places(name, mesh.order) @ matrix if self.collapses else matrix
+            own = self._at_own_nodes(name, mesh.order, matrix)
             found = np.einsum("kq,cqi->cki", own, flat[mine]).reshape(nodes.size, -1)
             parts = [np.bincount(nodes.ravel(), column, minlength=mesh.n_nodes) for column in found.T]
             total += np.stack(parts, axis=1)
             count += np.bincount(nodes.ravel(), minlength=mesh.n_nodes)
         return total.reshape(mesh.n_nodes, *values.shape[2:]), count
+
+    def _at_own_nodes(self, name: str, order: int, matrix: np.ndarray) -> np.ndarray:
+        """Return the matrix for the nodes of a shape by that for those of the hexahedron."""
+        if (name, order) == ("prism", 2):
+            points = np.array(OF_PRISMS.metadata(2 * order, order)["quadrature_points"])
+            corners = _linear_in_prism(np.array(SHAPES[name].vertex_places)) @ np.linalg.pinv(
+                _linear_in_prism(points)
+            )
+            sets = SHAPES[name].sets(len(_own_places(name, order)))
+            return np.stack([corners[list(each)].mean(axis=0) for each in sets]) @ self.to(points)
+        return _own_places(name, order) @ matrix if self.collapses else matrix
+
+
+def _linear_in_prism(places: np.ndarray) -> np.ndarray:
+    """Return 1, x and y of a triangle times 1 and z at places in the cube that is the prism, (m, 6)."""
+    x, y, z = places[:, 0] * (1.0 - places[:, 1]), places[:, 1], places[:, 2]
+    return np.stack([power * up for up in (np.ones_like(z), z) for power in (np.ones_like(x), x, y)], axis=1)
 
 
 def _own_places(name: str, order: int) -> np.ndarray:
