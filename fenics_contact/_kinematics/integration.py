@@ -38,10 +38,9 @@ class Integration:
         """
         if not intervals:
             return {"quadrature_degree": degree}
-        places, weights = np.polynomial.legendre.leggauss(degree // 2 + 1)
-        line = list(zip(0.5 + 0.5 * places, 0.5 * weights, strict=True))
+        line = _gauss(degree // 2 + 1)
         flat = tuple((x, y, a * b) for x, a in line for y, b in line)
-        return _custom(degree, flat, intervals, 2)
+        return _custom(degree, flat, _within(intervals, _gauss(2)), intervals)
 
     def stiffness(self, form: ufl.Form, in_full: Callable[[ufl.Form], ufl.Form]) -> ufl.Form:
         """Return a stiffness (UFL) by this integration, of one that has its degree.
@@ -100,29 +99,63 @@ class OfPrisms(Integration):
         """Return where a stiffness is evaluated; see `Integration.metadata`."""
         at = ((1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)) if order == 2 else ((1 / 3, 1 / 3),)
         flat = tuple((x / (1 - y), y, 0.5 / len(at) / (1 - y)) for x, y in at)
-        return _custom(degree, flat, intervals or ((0.0, 1.0),), 2 if intervals else order + 1)
+        line = _within(intervals or ((0.0, 1.0),), _gauss(2 if intervals else order + 1))
+        return _custom(degree, flat, line, intervals)
+
+
+@dataclass(frozen=True)
+class AlongRows(Reduced):
+    """Two points along the first direction of cells, and five in the others, for rows of single cells.
+
+    Rows do not lock as they bend along the first direction, and their sections do not deform without energy.
+    Loads and stresses are by the points of reduced integration. The five are Kronrod's extension of Gauss's
+    two, as in CalculiX: in round sections three bend 0.7 % too much.
+    """
+
+    name = "reduced along rows"
+    has_hourglasses = False
+
+    def metadata(
+        self, degree: int, order: int, intervals: tuple[tuple[float, float], ...] = ()
+    ) -> dict[str, Any]:
+        """Return where a stiffness is evaluated; see `Integration.metadata`."""
+        places = 0.0, 3.0**-0.5, -(3.0**-0.5), (6 / 7) ** 0.5, -((6 / 7) ** 0.5)
+        weights = 28 / 45, 27 / 55, 27 / 55, 98 / 495, 98 / 495
+        across = tuple((0.5 + 0.5 * y, 0.5 * b) for y, b in zip(places, weights, strict=True))
+        return _custom(degree, tuple((x, y, a * b) for x, a in _gauss(2) for y, b in across), across)
+
+
+def _gauss(count: int) -> tuple[tuple[float, float], ...]:
+    """Return Gauss points on [0, 1] and their weights."""
+    places, weights = np.polynomial.legendre.leggauss(count)
+    return tuple(zip((0.5 + 0.5 * places).tolist(), (0.5 * weights).tolist(), strict=True))
+
+
+def _within(
+    intervals: tuple[tuple[float, float], ...], line: tuple[tuple[float, float], ...]
+) -> tuple[tuple[float, float], ...]:
+    """Return points and weights in each of some intervals by those on [0, 1]."""
+    return tuple((low + (high - low) * z, (high - low) * w) for low, high in intervals for z, w in line)
 
 
 @cache
 def _custom(
     degree: int,
     flat: tuple[tuple[float, float, float], ...],
-    intervals: tuple[tuple[float, float], ...],
-    count: int,
+    line: tuple[tuple[float, float], ...],
+    intervals: tuple[tuple[float, float], ...] = (),
 ) -> dict[str, Any]:
-    """Return points and weights in the first two directions times `count` Gauss points in each interval."""
-    places, weights = np.polynomial.legendre.leggauss(count)
-    ends = np.array(intervals)[:, None]
-    across = ends @ (0.5 + 0.5 * np.array([-places, places])), 0.5 * np.diff(ends) * weights
-    z, deep = (each.ravel() for each in across)
-    x, y, wide = np.array(flat).T[:, :, None]
-    points = np.stack(np.broadcast_arrays(x, y, z), axis=2).reshape(-1, 3).tolist()
-    # Tuples are those of all their digits in UFL's signatures, arrays are not.
-    rule = {
-        "quadrature_points": tuple(map(tuple, points)),
-        "quadrature_weights": tuple((wide * deep).ravel().tolist()),
+    """Return points and weights in the first two directions times those in the third one.
+
+    Tuples are those of all their digits in UFL's signatures, arrays are not.
+    """
+    return {
+        "quadrature_rule": "custom",
+        "quadrature_degree": degree,
+        "intervals": intervals,
+        "quadrature_points": tuple((x, y, z) for x, y, _ in flat for z, _ in line),
+        "quadrature_weights": tuple(a * b for *_, a in flat for _, b in line),
     }
-    return {"quadrature_rule": "custom", "quadrature_degree": degree, "intervals": intervals, **rule}
 
 
 FULL = Integration()
@@ -130,3 +163,4 @@ REDUCED = Reduced()
 STABILISED = Stabilised()
 OF_PRISMS = OfPrisms()
 AT_SECTIONS = Stabilised(1e-6)
+ALONG_ROWS = AlongRows()

@@ -15,6 +15,7 @@ from fenics_contact._base.display import counted, displayed
 from fenics_contact._kinematics.base import Kinematics
 from fenics_contact._kinematics.element import Element
 from fenics_contact._kinematics.integration import (
+    ALONG_ROWS,
     AT_SECTIONS,
     FULL,
     OF_PRISMS,
@@ -61,9 +62,11 @@ class Body:
             and CAX8R. They lock less in bending and near incompressibility, and deform in ways that cost no
             energy where a cell shares no face with another one: two cells in each direction are safe.
             "stabilised": the same with one thousandth of "full", for rows of single cells; "reduced" is that,
-            too, where contact or a tie acts on one layer of cells. Of prisms alone "reduced" is 9 points, of
-            linear ones 2, as C3D15 and C3D6 have, unless materials have a history or depend on the mean
-            dilatation. Bodies of prisms and others, of pyramids or triangles are integrated in full.
+            too, where contact or a tie acts on one layer of cells. "rows": by 2 points along the first
+            direction of the cells alone, from their first to their second node, for beams of single cells. Of
+            prisms alone "reduced" is 9 points, of linear ones 2, as C3D15 and C3D6 have, unless materials
+            have a history or depend on the mean dilatation. Bodies of prisms and others, of pyramids or
+            triangles are integrated in full.
 
     Example:
         >>> from fenics_contact.gallery import rectangle
@@ -79,7 +82,7 @@ class Body:
     material: Material | Mapping[str, Material]
     axisymmetric: bool = False
     torsion: bool = False
-    integration: Literal["full", "reduced", "stabilised"] = "full"
+    integration: Literal["full", "reduced", "stabilised", "rows"] = "full"
 
     def __post_init__(self) -> None:
         """Refuse materials of another dimension and regions without exactly one material."""
@@ -146,6 +149,8 @@ class Body:
     def _integration(self) -> Integration:
         if self.integration == "full":
             return FULL
+        if self.integration == "rows":
+            return ALONG_ROWS
         if self._is_of_prisms:
             whole = any(has_history(each) or has_mean_dilatation(each) for each in self.materials)
             return FULL if whole else OF_PRISMS

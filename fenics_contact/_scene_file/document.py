@@ -439,10 +439,10 @@ class BodyPart(Part):
     torsion: bool = Field(
         False, description="whether a body of revolution may twist: a third component, around the axis"
     )
-    integration: Literal["full", "reduced", "stabilised"] = Field(
+    integration: Literal["full", "reduced", "stabilised", "rows"] = Field(
         "full",
         description="reduced: cells of 20 or 8 nodes by 2 points in each direction; stabilised: with one "
-        "thousandth of full, for rows of single cells",
+        "thousandth of full, for rows of single cells; rows: by 2 points along the first direction alone",
     )
 
 

@@ -127,8 +127,8 @@ def _body(deck: DeckCards, steps: DeckSteps, parts: Parts, part: Component) -> B
 
 def _integration(
     deck: DeckCards, part: Component, mesh: BodyMesh, materials: Iterable[Any]
-) -> Literal["full", "reduced", "stabilised"]:
-    """Return how the elements of a body are integrated; rows of single cells of shells need some of full."""
+) -> Literal["full", "reduced", "stabilised", "rows"]:
+    """Return how the elements of a body are integrated; rows of single cells need some of full."""
     found = integration_of(deck.mesh, part, deck.note)
     blocks = [deck.mesh.blocks[k] for k in np.unique(deck.mesh.block_of[part.elements])]
     if found == "reduced" and blocks[0].element.shape == "wedge":
@@ -137,6 +137,11 @@ def _integration(
         return found
     if found == "full" or not mesh.centres:
         return "full"
+    if blocks[0].element.is_row:
+        if any(map(is_nonlinear, materials)):
+            deck.note(blocks[0].card, "B32R are integrated in full where materials or strains are nonlinear")
+            return "full"
+        return "rows"
     layers = any(block.element.listed < block.element.count for block in blocks)
     return "stabilised" if layers and one_wide(mesh).any() else found
 

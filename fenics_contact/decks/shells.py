@@ -1,4 +1,4 @@
-"""What a deck holds, loads and heats of nodes of shells, on the nodes across their thickness."""
+"""What a deck holds, loads and heats of nodes of shells and beams, on the nodes across their thickness."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ def on_solids(deck: DeckCards, steps: DeckSteps) -> DeckSteps:
         if card.name == "NODALTHICKNESS" and not named:
             deck.note(card, "has no effect, as in CalculiX: no *SHELL SECTION has NODAL THICKNESS")
     for block in deck.mesh.blocks:
-        if block.element.listed in (3, 4) and block.element.listed < block.element.count:
+        if block.element.instead:
             deck.note(
                 block.card,
                 f"{block.card.name_of('TYPE')} get nodes in the middle of their edges and are solved as "
-                f"{'S6' if block.element.listed == 3 else 'S8R'}: CalculiX's own lock or hourglass",
+                f"{block.element.instead}",
             )
     inner = [replace(step, instants=[*map(held, step.instants)]) for step in steps.steps]
     steps = replace(steps, steps=inner, at_rest=held(steps.at_rest))
@@ -58,7 +58,9 @@ class _Carrier:
         self._check()
         if self._of_solids.any():
             count = np.count_nonzero(self._of_solids)
-            self.deck.note(self._card, f"shells share {count} nodes with solids, which they follow by hinges")
+            self.deck.note(
+                self._card, f"{count} nodes of shells or beams are of solids, too, and follow these by hinges"
+            )
         at_rest, *_ = changed = [self._instant(each) for each in (self.steps.at_rest, *self.steps.instants)]
         instants = iter(changed[1:])
         steps = [replace(step, instants=[next(instants) for _ in step.instants]) for step in self.steps.steps]
@@ -114,7 +116,7 @@ class _Carrier:
         Where a node has axes of its own CalculiX holds the mean alone, and so is it here.
         """
         motions = self.motions
-        held = (motions.ends[:, 1] >= 0) & self.marks[:, :3].any(axis=1)
+        held = (motions.ends[:, 1] >= 0) & self.marks[:, :3].any(axis=1) & ~motions.of_beam
         owner = np.flatnonzero(held & ~motions.is_knot & ~self._turned)
         return motions.ends[owner, 1], owner
 
@@ -138,8 +140,8 @@ class _Carrier:
         At corners of shells CalculiX shares a force by (−1, 4, −1) / 2, as comparison shows: so is it here.
         """
         found = (self.motions.motion.T @ given.ravel()).reshape(-1, 3)
-        bottom, middle, top = self.motions.ends.T
-        corner = (middle >= 0) & ~self.motions.is_knot
+        bottom, middle, top = self.motions.ends[:, :3].T
+        corner = (middle >= 0) & ~self.motions.is_knot & ~self.motions.of_beam
         for ends, share in ((bottom, -1.0), (middle, 2.0), (top, -1.0)):
             np.add.at(found, ends[corner], share * given[corner, :3])
         return np.asarray(found)
@@ -182,6 +184,9 @@ class _Carrier:
         number = np.repeat(np.flatnonzero(self._of_solids), 3)
         k = np.tile(np.arange(3), len(number) // 3)
         yield Rows.of(self._local[6 * number + k], self._given(self.motions.nodes[number], k))
+        turned = np.flatnonzero(held[:, 3:].any(axis=1) & self.motions.of_beam)
+        between = self.motions.inner(turned, 3 * len(self.deck.mesh.points))
+        yield Rows.of(between, sp.csr_matrix((between.shape[0], 6 * len(self.deck.mesh.points))))
 
     def _given(self, nodes: np.ndarray, components: np.ndarray) -> sp.csr_matrix:
         """Return the matrix that takes one component of a node of the deck in each row, (n, 6 n_nodes)."""
@@ -196,7 +201,8 @@ class _Carrier:
         every = self._gram(number, np.arange(3, 6))
         largest = np.linalg.eigvalsh(every)[:, -1]
         values, ways = np.linalg.eigh(self._gram(number, components))
-        place, way = np.nonzero(values > least**2 * largest[:, None])
+        free = (values <= least**2 * largest[:, None]) & ~self.motions.of_beam[number, None]
+        place, way = np.nonzero(~free)
         mine, share = number[place], ways[place, :, way] / np.sqrt(largest[place])[:, None]
         nodes = self.motions.nodes[mine]
         row = np.repeat(np.arange(len(mine)), len(components))
@@ -207,7 +213,7 @@ class _Carrier:
                 chosen, (6 * len(self.motions.nodes), 6 * len(self.deck.mesh.points)), strict=True
             )
         )
-        self._note_free(number, components, values <= least**2 * largest[:, None], ways)
+        self._note_free(number, components, free, ways)
         return Rows.of(mixed @ self._local, given)
 
     def _gram(self, number: np.ndarray, components: np.ndarray) -> np.ndarray:
@@ -246,29 +252,29 @@ class _Carrier:
             wrong = nodes[changed.any(axis=1)]
             for target in (each for each in steps.targets if np.isin(wrong, each.nodes).any()):
                 raise target.error(
-                    "nodes of shells must be held alike in all steps: hold them in each, or none"
+                    "nodes of shells and beams must be held alike in all steps: hold them in each, or none"
                 )
             if instant.kept[nodes].any():
                 raise next(t for t in steps.targets if t.fixed).error(
-                    "nodes of shells that were free before cannot be FIXED: give values"
+                    "nodes of shells and beams that were free before cannot be FIXED: give values"
                 )
         if self.deck.references[nodes].any():
             number = self.deck.mesh.numbers[nodes[self.deck.references[nodes]][0]]
             raise self._card.error(
-                f"node {number} of a shell also drives a surface or a bolt: give that one its own"
+                f"node {number} of a shell or beam also drives a surface or a bolt: give that one its own"
             )
         if not steps.large:
             return
         if len(self.motions.of_joint):
             number = self.deck.mesh.numbers[nodes[self.motions.of_joint[0]]]
             raise self._card.error(
-                f"shells meet in a knot at node {number}, which is for small displacements: leave NLGEOM out"
+                f"shells or beams meet in a knot at node {number}, for small displacements: leave NLGEOM out"
             )
         for step in steps.steps:
             for instant in step.instants:
                 if np.nan_to_num(instant.held[nodes, 3:]).any() or instant.forces[nodes, 3:].any():
                     raise step.card.error(
-                        "with NLGEOM rotations and moments of nodes of shells are not supported"
+                        "with NLGEOM rotations and moments of nodes of shells and beams are not supported"
                     )
 
     def _check_moments(self, given: np.ndarray, most: float = 0.02) -> None:
@@ -286,12 +292,13 @@ class _Carrier:
 class ShellPrints:
     """How values of nodes of shells are those of the nodes across their thickness.
 
-    `sources` and `ends`: as in `ShellNodes`, by numbers in the deck; `rows`: equations that hold nodes, and
-    `of_rows`: the sources of these.
+    `sources`, `ends` and `weights`: as in `ShellNodes`, by numbers in the deck; `rows`: equations that hold
+    nodes, and `of_rows`: the sources of these.
     """
 
     sources: np.ndarray
     ends: np.ndarray
+    weights: np.ndarray
     rows: Rows
     of_rows: np.ndarray
 
@@ -305,7 +312,8 @@ class ShellPrints:
         rows = replace(rows, number=rows.number + before)
         sources = np.repeat(np.arange(len(numbers))[:, None], 2, axis=1)
         sources[shells.node] = shells.sources
-        return cls(numbers[shells.sources], numbers[shells.ends], rows, numbers[sources[rows.node]])
+        across = numbers[shells.ends], shells.weights
+        return cls(numbers[shells.sources], *across, rows, numbers[sources[rows.node]])
 
     @property
     def is_held(self) -> bool:
@@ -325,9 +333,7 @@ class ShellPrints:
         """
         place, there = self._across(nodes)
         mine = there.any(axis=1) & (self.sources[:, 0] == self.sources[:, 1])
-        weights = there[mine] * np.array([1.0, 4.0, 1.0])
-        weights /= weights.sum(axis=1, keepdims=True)
-        found = np.einsum("nk,nkd->nd", weights, values[place[mine]])
+        found = np.einsum("nk,nkd->nd", self.weights[mine], values[place[mine]])
         return np.vstack([self._own(nodes, values), np.column_stack([self.sources[mine, 0], found])])
 
     def flat(self, kind: str, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ MESH_CARDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"}
 #: Cards of the model that are read.
 MODEL_CARDS = {
     "SOLIDSECTION", "SHELLSECTION", "NODALTHICKNESS", "MATERIAL", "ORIENTATION", "DISTRIBUTION", "AMPLITUDE",
-    "INITIALCONDITIONS", "TRANSFORM", "CONTACTPAIR",
+    "BEAMSECTION", "INITIALCONDITIONS", "TRANSFORM", "CONTACTPAIR",
     "SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "CLEARANCE", "TIE", "RIGIDBODY",
     "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTINGCOUPLING", "EQUATION", "PRE-TENSIONSECTION",
     "CYCLICSYMMETRYMODEL", "MPC", "SPRING", "MASS",
@@ -97,6 +97,7 @@ PARAMETERS: dict[str, set[str]] = {
     "SURFACE": {"NAME", "TYPE"},
     "SOLIDSECTION": {"ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "CONTROLS"},  # OFFSET of layers
     "SHELLSECTION": {"ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODALTHICKNESS", "COMPOSITE"},
+    "BEAMSECTION": {"ELSET", "MATERIAL", "ORIENTATION", "SECTION", "OFFSET1", "OFFSET2"},
     "NODALTHICKNESS": set(),
     "MATERIAL": {"NAME"},
     "ELASTIC": {"TYPE"},
@@ -143,8 +144,8 @@ PARAMETERS: dict[str, set[str]] = {
 STRUCTURES = {
     "SHELLGENERALSECTION": "shells of given stiffness are not solved here: give *SHELL SECTION",
     "MEMBRANESECTION": "membranes are not solved here: mesh the part with solid elements",
-    "BEAMSECTION": "beams are not solved here: mesh the part with solid elements",
-    "BEAMGENERALSECTION": "beams are not solved here: mesh the part with solid elements",
+    "BEAMGENERALSECTION": "beams of given stiffness, pipes and boxes are not solved here: mesh the part with "
+    "solid elements",
     "DASHPOT": "dashpots are not solved here, where nothing moves in time: leave them out",
     "GAP": "gaps between nodes are not read: give a *CONTACT PAIR",
     "USERMATERIAL": "materials of user routines are not read: take one of the guide, or write it in Python",

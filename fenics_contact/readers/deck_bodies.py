@@ -46,7 +46,7 @@ class Section:
 
 
 #: Cards that give elements their material.
-SECTIONS = ("SOLIDSECTION", "SHELLSECTION")
+SECTIONS = ("SOLIDSECTION", "SHELLSECTION", "BEAMSECTION")
 
 
 def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section], np.ndarray]:

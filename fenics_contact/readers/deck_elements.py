@@ -66,6 +66,16 @@ class Element:
         """Number of nodes that the deck lists for it."""
         return len(self.written)
 
+    @property
+    def is_row(self) -> bool:
+        """Whether it is one of a row of cells that a beam has become."""
+        return False
+
+    @property
+    def instead(self) -> str:
+        """Type as which it is solved, and why, where that is another one."""
+        return ""
+
     def side(self, label: str) -> int:
         """Return the position of the face that a label names, "S3" or "P3", −1 where there is none."""
         place = int(label[1:]) - 1 if label[:1] in "SP" and label[1:].isdecimal() else -1
@@ -157,28 +167,86 @@ class Shell(Element):
 
 
 @dataclass(frozen=True, eq=False)
+class Beam(Element):
+    """Elements of a line; the faces of the solid cell that they become have its nodes."""
+
+    @property
+    def dim(self) -> int:
+        """Dimension of its space."""
+        return 3
+
+    @property
+    def faces(self) -> Sequence[Sequence[int]]:
+        """Its nodes for each face of the solid cell."""
+        return (tuple(range(self.count)),) * 6
+
+    @property
+    def face_nodes(self) -> Sequence[Sequence[int]]:  # type: ignore[override]
+        """Its nodes for each face of the solid cell."""
+        return self.faces
+
+    def side(self, label: str) -> int:
+        """Return the position of the face of the solid cell that a label names."""
+        return _ACROSS.get(label, -1)
+
+
+@dataclass(frozen=True, eq=False)
 class Layer(Element):
-    """Solid cells that shells have become; `listed`: number of nodes of the shells."""
+    """Solid cells that shells have become.
+
+    `listed`: number of nodes of these; `instead`: type as which those without midpoints are solved, and why.
+    """
 
     listed: int = 0  # type: ignore[misc]
+    instead: str = ""  # type: ignore[misc]
 
     @classmethod
     def of(cls, shell: Element) -> Layer:
         """Return that of shells."""
+        instead = _RAISED.get(shell.name.rstrip("R"), "")
         if shell.count in (3, 6):
-            return cls("C3D15", "solid", "wedge15", 15, "", shell.count)
+            return cls("C3D15", "solid", "wedge15", 15, "", shell.count, instead)
         variant = "" if shell.name == "S8" else "R"
-        return cls(f"C3D20{variant}", "solid", "hexahedron20", 20, variant, shell.count)
+        return cls(f"C3D20{variant}", "solid", "hexahedron20", 20, variant, shell.count, instead)
 
     def side(self, label: str) -> int:
         """Return the position of the face that a label names: of both sides "SNEG" and "SPOS"."""
         return _SIDES[label] if label in _SIDES else super().side(label)
 
 
+@dataclass(frozen=True, eq=False)
+class Row(Layer):
+    """Solid cells that beams have become, whose first direction is along these."""
+
+    @property
+    def is_row(self) -> bool:
+        """Whether it is one of a row of cells that a beam has become."""
+        return True
+
+    @classmethod
+    def of(cls, beam: Element) -> Row:
+        """Return that of beams."""
+        instead = _RAISED.get(beam.name.rstrip("R"), "")
+        variant = "" if beam.name == "B32" else "R"
+        return cls(f"C3D20{variant}", "solid", "hexahedron20", 20, variant, beam.count, instead)
+
+    def side(self, label: str) -> int:
+        """Return the position of the face of the solid cell that a label of beams names."""
+        return _ACROSS.get(label, -1)
+
+
 #: Faces of shells that have names, of edges those of Abaqus; a pressure without a number acts on the first.
 _SIDES = {"SNEG": 0, "SPOS": 1, "P": 0, "E1": 2, "E2": 3, "E3": 4, "E4": 5}
-#: Types of shells with the number of their nodes.
+#: Types of shells and beams with the number of their nodes.
 _SHELLS = {"S3": 3, "S3R": 3, "S4": 4, "S4R": 4, "S6": 6, "S8": 8, "S8R": 8}
+_BEAMS = {"B31": 2, "B31R": 2, "B32": 3, "B32R": 3}
+#: Faces of the cells of beams by their labels: pressures along directions 1 and 2, and sides of surfaces.
+_ACROSS = {"P1": 0, "P2": 4, "S1": 0, "S2": 1, "S3": 2, "S5": 4}
+#: As what elements without midpoints are solved, by their types without "R".
+_RAISED = {
+    "S3": "S6: CalculiX's own lock or hourglass", "S4": "S8R: CalculiX's own lock or hourglass",
+    "B31": "B32R: CalculiX's own have incompatible modes, or hourglass",
+}  # fmt: skip
 
 
 #: What elements of other programs are, by how their types begin.
@@ -194,6 +262,8 @@ def element_of(card: Card) -> Element:
     name = card.required("TYPE")
     if name in _SHELLS:
         return Shell(name, "shell", "shell", _SHELLS[name], "")
+    if name in _BEAMS:
+        return Beam(name, "beam", "beam", _BEAMS[name], "")
     match = _TYPE.fullmatch(name)
     kind = _KINDS[match.group(1)] if match else ""
     count = int(match.group(2)) if match else 0
@@ -202,7 +272,7 @@ def element_of(card: Card) -> Element:
         what = next((words for start, words in _OTHERS.items() if name.startswith(start)), "")
         raise card.error(
             f"elements of type {name}{what} are not supported: give solids (C3D4, 6, 8, 10, 15, 20), shells "
-            "(S3, 4, 6, 8), plane ones (CPS, CPE 3, 4, 6, 8) or axisymmetric ones (CAX)"
+            "(S3, 4, 6, 8), beams (B31, B32), plane ones (CPS, CPE 3, 4, 6, 8) or axisymmetric ones (CAX)"
         )
     return Element(name, kind, cell, count, match.group(3))
 
@@ -271,6 +341,8 @@ def without_repeated(
             remedy = (
                 "take S3 or S6"
                 if element.kind == "shell"
+                else "give each its own"
+                if element.kind == "beam"
                 else "take CPS6, CPE6, CAX6, C3D15 or C3D10"
                 if element.count > 8 or element.dim == 2
                 else "they must be a prism, a pyramid or a tetrahedron"

@@ -1,7 +1,8 @@
-"""Which nodes of solid cells belong to the nodes of shells."""
+"""Which nodes of solid cells belong to the nodes of shells and beams."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +13,36 @@ class ShellNodes:
     """Nodes across the thickness, for each node of shells and each direction that the shells have there.
 
     `node`: its position; `ends`: positions of the nodes at the bottom, in the middle, −1 where there is none,
-    and on top, (n, 3); `sources`: twice the node, or, where it was added in the middle of an edge of shells
-    of 3 and 4 nodes, the ends of this, (n, 2).
+    and on top, (n, 3), of beams those around the section: corner, middle of a side, corner, ..., (n, 8), of
+    shells between them filled up by −1; `sources`: twice the node, or, where it was added in the middle of an
+    edge of shells of 3 and 4 nodes or of a beam of two, the ends of this, (n, 2).
     """
 
     node: np.ndarray
     ends: np.ndarray
     sources: np.ndarray
+
+    @property
+    def of_beams(self) -> np.ndarray:
+        """Which are of beams, (n,)."""
+        return np.asarray((self.ends[:, 3:] >= 0).any(axis=1))
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Shares that the nodes across have of the displacements that CalculiX prints, as `ends`."""
+        inner = np.arange(self.ends.shape[1]) % 2 == 1
+        share = np.where(inner, np.where(self.of_beams[:, None], 0.0, 4.0), 1.0) * (self.ends >= 0)
+        return np.asarray(share / share.sum(axis=1, keepdims=True))
+
+    def joined(self, other: ShellNodes) -> ShellNodes:
+        """Return these nodes and others."""
+        width = max(self.ends.shape[1], other.ends.shape[1])
+        ends = [
+            np.pad(each.ends, ((0, 0), (0, width - each.ends.shape[1])), constant_values=-1)
+            for each in (self, other)
+        ]
+        node, sources = np.append(self.node, other.node), np.vstack([self.sources, other.sources])
+        return ShellNodes(node, np.vstack(ends), sources)
 
     @property
     def added(self) -> np.ndarray:
@@ -50,6 +74,24 @@ class ShellNodes:
             there = column >= 0
             result[column[there]] = values[self.sources[there]].mean(axis=1)
         return result
+
+
+def first_come(node: np.ndarray, fits: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return the number of the group of each node of an element.
+
+    The first element of a node has the first group, the first that does not fit the next one. `fits`: returns
+    which of some nodes of elements go with others.
+    """
+    group = np.full(len(node), -1)
+    count, first = 0, np.zeros(int(node.max()) + 1, dtype=np.int64)
+    number = first.copy()
+    while (rest := np.flatnonzero(group < 0)).size:
+        nodes, place = np.unique(node[rest], return_index=True)
+        first[nodes], number[nodes] = rest[place], count + np.arange(len(nodes))
+        mine = rest[fits(rest, first[node[rest]])]
+        group[mine] = number[node[mine]]
+        count += len(nodes)
+    return group
 
 
 _NONE = np.zeros(0, dtype=np.int64)

@@ -12,18 +12,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenics_contact.mesh.thin_bodies import CORNERS, facet_normals, layer_cells, raised
+from fenics_contact.readers.deck_beams import with_beams
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_elements import Layer
 from fenics_contact.readers.deck_mesh import Block, DeckMesh, read_mesh_cards
 from fenics_contact.readers.deck_plies import plies_of
-from fenics_contact.readers.deck_shell_nodes import ShellNodes
+from fenics_contact.readers.deck_shell_nodes import ShellNodes, first_come
 
 
 def read_solid_mesh(cards: Sequence[Card]) -> DeckMesh:
-    """Return nodes, elements, sets and surfaces of a deck, with solid cells in place of shells."""
+    """Return nodes, elements, sets and surfaces of a deck, with solid cells in place of shells and beams."""
     mesh = read_mesh_cards(cards)
     blocks = [k for k, block in enumerate(mesh.blocks) if block.element.kind == "shell"]
-    return _expanded(mesh, blocks, _Depths.of(mesh, cards, blocks)) if blocks else mesh
+    return with_beams(_expanded(mesh, blocks, _Depths.of(mesh, cards, blocks)) if blocks else mesh, cards)
 
 
 def _expanded(mesh: DeckMesh, places: Sequence[int], depths: _Depths) -> DeckMesh:
@@ -149,23 +150,21 @@ class _Incidences:
     def grouped(self, alike: float = np.cos(np.radians(20.0))) -> tuple[np.ndarray, np.ndarray]:
         """Return the number of the direction across the shells that each has, and its sense along it.
 
-        `alike`: cosine of the largest angle between elements that have one direction. The first element of a
-        node has the first one, the first that does not fit the next one. Shells that face opposite ways have
-        the same direction.
+        `alike`: cosine of the largest angle between elements that have one direction. Shells that face
+        opposite ways have the same direction.
         """
-        group, sign = np.full((2, len(self.node)), -1)
-        count, first = 0, np.zeros(int(self.node.max()) + 1, dtype=np.int64)
-        number = first.copy()
-        while (rest := np.flatnonzero(group < 0)).size:
-            nodes, place = np.unique(self.node[rest], return_index=True)
-            first[nodes], number[nodes] = rest[place], count + np.arange(len(nodes))
-            of = first[self.node[rest]]
-            cosine = np.einsum("nd,nd->n", self.normal[rest], self.normal[of])
-            sense = np.where(cosine > 0, 1, -1)
-            fits = (np.abs(cosine) > alike) & (self.thickness[rest] == self.thickness[of])
-            fits &= self.offset[rest] * sense == self.offset[of]
-            group[rest[fits]], sign[rest[fits]] = number[self.node[rest[fits]]], sense[fits]
-            count += len(nodes)
+
+        def cosine(rest: np.ndarray, of: np.ndarray) -> np.ndarray:
+            return np.asarray(np.einsum("nd,nd->n", self.normal[rest], self.normal[of]))
+
+        def fits(rest: np.ndarray, of: np.ndarray) -> np.ndarray:
+            found = cosine(rest, of)
+            same = (np.abs(found) > alike) & (self.thickness[rest] == self.thickness[of])
+            return np.asarray(same & (self.offset[rest] * np.where(found > 0, 1, -1) == self.offset[of]))
+
+        group = first_come(self.node, fits)
+        _, first = np.unique(group, return_index=True)
+        sign = np.where(cosine(np.arange(len(group)), first[group]) > 0, 1, -1)
         return group, sign
 
     def ends(

@@ -137,7 +137,7 @@ def test_a_knot_is_held_and_loaded_as_one_piece(tmp_path: Path) -> None:
     text = text_of(points, facets, [(root, "1, 6"), (knots, "2, 2")], loads)
     _, _, reaction = solved(tmp_path, text)
     np.testing.assert_allclose(reaction, (-3, 0, -9), atol=1e-7)
-    with pytest.raises(DeckError, match=r"shells meet in a knot at node \d+, .*leave NLGEOM out"):
+    with pytest.raises(DeckError, match=r"shells or beams meet in a knot at node \d+, .*leave NLGEOM out"):
         solved(tmp_path, text.replace("*STEP", "*STEP, NLGEOM"))
 
 
@@ -303,7 +303,7 @@ PRESSED = text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.")
         (
             "*STEP\n",
             "*RIGID BODY, ELSET=ALL, REF NODE=43\n*STEP\n",
-            r"node 43 of a shell also drives a surface",
+            r"node 43 of a shell or beam also drives a surface",
         ),
         ("*STATIC", "*STATIC\n*CLOAD\n43, 5, 1.", ""),
     ],

@@ -81,7 +81,7 @@ def test_subdomains_do_not_matter() -> None:
 def test_reduced_integration_needs_cells_of_20_or_8_nodes() -> None:
     with pytest.raises(InvalidInputError, match="reduced integration needs hexahedra of 20"):
         Body(quadratic(rectangle((0, 0), (1, 1), (2, 2))), PlaneStrain(1e3, 0.3), integration="reduced")
-    with pytest.raises(InvalidInputError, match="must be 'full', 'reduced' or 'stabilised'"):
+    with pytest.raises(InvalidInputError, match="must be 'full', 'reduced', 'stabilised' or 'rows'"):
         Body(STRIP, PlaneStrain(1e3, 0.3), integration="Reduced")  # type: ignore[arg-type]
 
 
