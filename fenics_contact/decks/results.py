@@ -39,13 +39,13 @@ class DeckResults:
     #: Kinds of fields by card and variable.
     kinds: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "NODEFILE": {"U": "DISP", "RF": "FORC"},
-        "ELFILE": {"S": "STRESS", "E": "TOSTRAIN"},
+        "ELFILE": {"S": "STRESS", "E": "TOSTRAIN", "PEEQ": "PE"},
         "CONTACTFILE": {"CDIS": "CONTACT", "CSTR": "CONTACT"},
     }
     #: Variables that are printed, by card.
     printed: ClassVar[Mapping[str, Sequence[str]]] = {
         "NODEPRINT": ("U", "RF"),
-        "ELPRINT": ("S", "E"),
+        "ELPRINT": ("S", "E", "PEEQ"),
         "CONTACTPRINT": ("CDIS", "CSTR", "CF", "CFN", "CFS"),
     }
 
@@ -218,7 +218,7 @@ class Tables:
         """Yield the tables of a variable."""
         made: dict[str, Callable[[Print], Iterator[str]]] = {
             "U": self._displacements, "RF": self._forces, "S": self._stresses, "E": self._strains,
-            "CDIS": self._distances, "CSTR": self._tractions,
+            "PEEQ": self._plastic_strains, "CDIS": self._distances, "CSTR": self._tractions,
         }  # fmt: skip
         yield from made.get(variable, self._resultants)(asked)
 
@@ -258,8 +258,12 @@ class Tables:
         head = f"strains (elem, integ.pnt.,exx,eyy,ezz,exy,exz,eyz) for set {asked.where}"
         yield self._head(head) + self._at_points(asked, "strain")
 
+    def _plastic_strains(self, asked: Print) -> Iterator[str]:
+        head = f"equivalent plastic strain (elem, integ.pnt.,pe)for set {asked.where}"
+        yield self._head(head) + self._at_points(asked, "plastic_strain")
+
     def _at_points(self, asked: Print, what: str) -> str:
-        deck, found = self.results.deck, [np.zeros((0, 8))]
+        deck, found = self.results.deck, list[np.ndarray]()
         mesh = deck.mesh.mesh
         for body, numbers in deck.element_numbers.items():
             at = self.state.gather_at_points(body)
@@ -267,8 +271,10 @@ class Tables:
                 mine = np.isin(numbers, block.numbers) & np.isin(numbers, deck.element_sets[asked.where])
                 if mine.any():
                     found.append(_point_rows(block, at, numbers[mine], getattr(at, what)[mine]))
+        if not found:
+            return ""
         rows = np.concatenate(found)
-        row = "%10d %3d" + " %13.6E" * 6 + "\n"
+        row = "%10d %3d" + " %13.6E" * (rows.shape[1] - 2) + "\n"
         return formatted(row, rows[np.argsort(rows[:, 0], kind="stable")])
 
     def _distances(self, asked: Print) -> Iterator[str]:
@@ -328,10 +334,12 @@ def _sums(values: Sequence[float] | np.ndarray) -> str:
 def _point_rows(block: Block, at: PointFields, numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return number, point and components of elements at CalculiX's points."""
     places, layers = points_of(block.element, at.collapses)
-    own = np.einsum("mq,cqij->cmij", at.to(places), values)
-    own = np.tile(own, (1, layers, 1, 1))
+    own = np.einsum("mq,cq...->cm...", at.to(places), values)
+    own = np.tile(own, (1, layers, *[1] * (own.ndim - 2)))
     points = np.tile(np.arange(1, own.shape[1] + 1), len(own))
-    parts = [own[..., i, j].ravel() for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    parts = [own.ravel()]
+    if own.ndim == 4:
+        parts = [own[..., i, j].ravel() for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     return np.column_stack([np.repeat(numbers, own.shape[1]), points, *parts])
 
 

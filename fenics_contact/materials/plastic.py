@@ -143,6 +143,10 @@ class HistoryMaterial(Expanding):
         """
         return self.respond(gradient, history, duration)
 
+    def equivalent_plastic_strain(self, history: np.ndarray) -> np.ndarray:
+        """Return the accumulated equivalent plastic strain, shape (n,): zeros unless a model has one."""
+        return np.zeros(len(history))
+
     def admissible(self, history: np.ndarray) -> np.ndarray:
         """Return internal variables that points may have, near means of those of several points, (n, k).
 
@@ -300,6 +304,10 @@ class VonMisesMetal(HistoryMaterial):
     def history_size(self) -> int:
         """A symmetric tensor of plastic deformation, and the equivalent plastic strain."""
         return 7
+
+    def equivalent_plastic_strain(self, history: np.ndarray) -> np.ndarray:
+        """Return the accumulated equivalent plastic strain, shape (n,)."""
+        return history[:, 6]
 
 
 @dataclass(frozen=True)

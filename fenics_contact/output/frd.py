@@ -13,6 +13,7 @@ import numpy as np
 
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.collapsed import by_shape
 from fenics_contact.output.files import replacing
 from fenics_contact.output.result import own_version
@@ -90,6 +91,7 @@ class FrdField:
         "STRESS": ("SXX", "SYY", "SZZ", "SXY", "SYZ", "SZX"),
         "TOSTRAIN": ("EXX", "EYY", "EZZ", "EXY", "EYZ", "EZX"),
         "FORC": ("F1", "F2", "F3"),
+        "PE": ("PE",),
         "CONTACT": ("COPEN", "CSLIP1", "CSLIP2", "CPRESS", "CSHEAR1", "CSHEAR2"),
     }
 
@@ -100,6 +102,8 @@ class FrdField:
         if len(names) == 3:
             lines = [f" -5  {name:8s}    1    2{k:5d}    0" for k, name in enumerate(names, start=1)]
             lines.append(" -5  ALL         1    2    0    0    1ALL")
+        elif len(names) == 1:
+            lines = [f" -5  {names[0]:8s}    1    1    0    0"]
         else:
             places = zip(names, self.tensor, strict=True)
             lines = [f" -5  {name:8s}    1    4{i:5d}{j:5d}" for name, (i, j) in places]
@@ -168,7 +172,8 @@ def write_frd(path: str | Path, states: State | Sequence[State], times: Sequence
     """Write states as CalculiX writes its results, for cgx, FreeCAD, PrePoMax and converters.
 
     Nodes and cells are numbered from 1 body by body, materials are named by bodies. On nodes are DISP,
-    STRESS, TOSTRAIN, FORC and, where there is contact, CONTACT: COPEN is the gap, CSLIP the slip since the
+    STRESS, TOSTRAIN, FORC, of materials with a history PE, the accumulated plastic strain, and, where there
+    is contact, CONTACT: COPEN is the gap, CSLIP the slip since the
     undeformed state with its elastic part, CPRESS the pressure and CSHEAR the friction on the master, along
     the projection of the axis x on the surface (of z where x is normal) and across it; at nodes of slaves,
     zero at others. Numbers
@@ -203,9 +208,12 @@ def write_frd(path: str | Path, states: State | Sequence[State], times: Sequence
     if len(given) != len(several):
         raise InvalidInputError(f"times must have one for each of {len(several)} states, got {len(given)}")
     comm, numbering = several[0].torn.decomposition.comm, BodyNumbers.of(several[0])
-    with writing(comm, Path(path), numbering.mesh, list(several[0].scene.bodies)) as writer:
+    bodies = several[0].scene.bodies
+    remembers = any(has_history(material) for body in bodies.values() for material in body.materials)
+    kinds = [kind for kind in FrdField.kinds if kind != "PE" or remembers]
+    with writing(comm, Path(path), numbering.mesh, list(bodies)) as writer:
         for number, (state, time) in enumerate(zip(several, given, strict=True), start=1):
-            add_on_first(comm, writer, nodal_fields(state, numbering, tuple(FrdField.kinds)), time, number, 1)
+            add_on_first(comm, writer, nodal_fields(state, numbering, kinds), time, number, 1)
     return Path(path)
 
 
@@ -298,7 +306,7 @@ def nodal_fields(state: State, numbering: BodyNumbers, kinds: Sequence[str]) -> 
     if "DISP" in kinds:
         moved = numbering.summed({name: state.gather_displacement(name) for name in bodies})
         found["DISP"] = in_space(moved / np.maximum(ones, 1.0))
-    if {"STRESS", "TOSTRAIN"} & set(kinds):
+    if {"STRESS", "TOSTRAIN", "PE"} & set(kinds):
         found |= _on_nodes(state, numbering)
     if "FORC" in kinds:
         forces = numbering.summed({name: state.gather_internal_forces(name) for name in bodies})
@@ -311,17 +319,19 @@ def nodal_fields(state: State, numbering: BodyNumbers, kinds: Sequence[str]) -> 
 
 
 def _on_nodes(state: State, numbering: BodyNumbers) -> dict[str, np.ndarray]:
-    """Return stresses and strains at nodes."""
-    parts: dict[str, dict[str, np.ndarray]] = {"stress": {}, "strain": {}}
+    """Return stresses, strains and equivalent plastic strains at nodes."""
+    names = {"stress": "STRESS", "strain": "TOSTRAIN", "plastic_strain": "PE"}
+    parts: dict[str, dict[str, np.ndarray]] = {kind: {} for kind in names}
     counts = {}
     for name, body in state.scene.deforming.items():
         at = state.gather_at_points(name)
         for kind, values in parts.items():
             total, count = at.at_nodes(getattr(at, kind), body.mesh)
-            values[name] = np.stack([total[:, i - 1, j - 1] for i, j in FrdField.tensor], axis=1)
+            values[name] = total[:, None]
+            if total.ndim == 3:
+                values[name] = np.stack([total[:, i - 1, j - 1] for i, j in FrdField.tensor], axis=1)
             counts[name] = count[:, None]
     count = np.maximum(numbering.summed(counts), 1.0)
-    names = {"stress": "STRESS", "strain": "TOSTRAIN"}
     return {names[kind]: numbering.summed(values) / count for kind, values in parts.items()}
 
 

@@ -14,6 +14,7 @@ import ufl
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.forms import temperature_of
 from fenics_contact._fem.templates import quadrature_degree, volume_measure
 from fenics_contact._kinematics.base import Gradients
@@ -23,6 +24,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlinear
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CellType, quadrature, shape_gradients, shape_values
 from fenics_contact.mesh.collapsed import SHAPES, as_hexahedra, by_shape, collapse, places_of
@@ -45,11 +47,14 @@ class PointFields:
         strain: Shape (n_cells, n_points, 3, 3): ½ (∇u + ∇uᵀ), where bodies deform much ½ (FᵀF − 1). Normal to
             plane bodies it is zero, in plane stress with isotropic materials −ν/E (σ₁₁ + σ₂₂), without what
             heat adds.
+        plastic_strain: Shape (n_cells, n_points): the accumulated equivalent plastic strain, zero in
+            materials without one.
     """
 
     positions: np.ndarray
     stress: np.ndarray
     strain: np.ndarray
+    plastic_strain: np.ndarray
     _cell: CellType
 
     @property
@@ -201,11 +206,15 @@ def point_fields(
     """
     body, comm = torn.scene.bodies[name], torn.decomposition.comm
     points = _Points(body, displacement)
-    at = PointStress(u.function_space.mesh, body, comm, temperature_of(torn.scene.loads, name))
-    stress = _gathered(at, u, body, len(points.positions))
+    points_stress = PointStress(u.function_space.mesh, body, comm, temperature_of(torn.scene.loads, name))
+    stress = _gathered(points_stress, u, body, len(points.positions))
     _put_mean_pressure(body, stress)
-    _put_history(torn, name, stress, responses)
-    return PointFields(points.positions, stress, points.strain(stress), body.element.cell)
+    plastic, parts = np.zeros(stress.shape[:2]), zip(torn.decomposition.meshes, responses, strict=False)
+    mine = [(mesh.cells, response) for mesh, response in parts if mesh.body == name]
+    _overwrite(comm, stress, [(at, end.stress) for at, end in mine if end.stress is not None])
+    found = [(at, _plastic_strain(body, at, end.history)) for at, end in mine if end.history is not None]
+    _overwrite(comm, plastic, found)
+    return PointFields(points.positions, stress, points.strain(stress), plastic, body.element.cell)
 
 
 def _gathered(at: PointStress, u: _dolfinx.fem.Function, body: Body, count: int) -> np.ndarray:
@@ -226,17 +235,26 @@ def _put_mean_pressure(body: Body, stress: np.ndarray) -> None:
             stress[mine] += (pressure.mean(axis=1, keepdims=True) - pressure)[..., None, None] * np.eye(3)
 
 
-def _put_history(torn: TornSystem, name: str, stress: np.ndarray, responses: Sequence[Response]) -> None:
-    """Overwrite the stress in cells of materials with a history, which the ranks know. Collective."""
-    known = np.full_like(stress, np.nan)
-    for mesh, response in zip(torn.decomposition.meshes, responses, strict=False):
-        if mesh.body == name and response.stress is not None:
-            known[mesh.cells] = response.stress
+def _plastic_strain(body: Body, cells: np.ndarray, history: np.ndarray) -> np.ndarray:
+    """Return the equivalent plastic strain at the points of some cells, from what materials remember."""
+    found, tags = np.zeros(history.shape[:2]), body.material_of_cells[cells]
+    for number, material in enumerate(body.materials):
+        if has_history(material):
+            own = history[tags == number][..., : material.history_size]
+            strain = material.equivalent_plastic_strain(own.reshape(-1, material.history_size))
+            found[tags == number] = strain.reshape(own.shape[:2])
+    return found
+
+
+def _overwrite(comm: MPI.Comm, values: np.ndarray, parts: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    """Overwrite values in cells that this or another rank knows; NaN is unknown. Collective."""
+    known = np.full_like(values, np.nan)
+    for cells, own in parts:
+        known[cells] = own
     here = ~np.isnan(known)
-    comm = torn.decomposition.comm
     total = comm.allreduce(np.where(here, known, 0.0))
     count = comm.allreduce(here.astype(float))
-    stress[count > 0.0] = total[count > 0.0]
+    values[count > 0.0] = total[count > 0.0]
 
 
 def forces_at_rest(torn: TornSystem, name: str, mesh: _dolfinx.mesh.Mesh) -> np.ndarray:

@@ -197,15 +197,22 @@ def test_sections_of_preloads_have_their_nodes_once(tmp_path: Path) -> None:
 def test_stresses_of_materials_with_a_history_are_those_of_their_points(more: str, tmp_path: Path) -> None:
     """A bar is stretched far beyond its yield stress; it hardens by 100 N/mm²."""
     plastic = BAR.replace("210000., 0.3\n", "210000., 0.3\n*PLASTIC\n200., 0.\n300., 1.\n")
-    cards = "*BOUNDARY\nBAR_X1, 1, 1, 0.03\n*EL FILE\nS\n"
+    cards = "*BOUNDARY\nBAR_X1, 1, 1, 0.03\n*EL FILE\nS, PEEQ\n*EL PRINT, ELSET=BAR\nPEEQ\n"
     path = deck(tmp_path, plastic + FREE_TO_CONTRACT + step(cards, more))
     job(path)
-    (block,) = read_frd(path.with_suffix(".frd")).blocks
+    block, plastic_strain = read_frd(path.with_suffix(".frd")).blocks
     strain = np.log(1.01) if more else 0.01
     expected = (200.0 + 100.0 * strain) / (1.0 + 100.0 / 210000.0)
     assert np.array(list(block.values.values())) == pytest.approx(
         np.tile([expected, 0, 0, 0, 0, 0], (len(block.values), 1)), abs=0.02
     )
+    flow = (expected - 200.0) / 100.0
+    assert plastic_strain.kind == "PE"
+    assert np.array(list(plastic_strain.values.values())) == pytest.approx(flow, abs=2e-4)
+    printed = path.with_suffix(".dat").read_text().splitlines()
+    assert " equivalent plastic strain (elem, integ.pnt.,pe)for set BAR and time  0.1000000E+01" in printed
+    rows = np.array([line.split() for line in printed[3:]], dtype=float)
+    assert rows[:, 2] == pytest.approx(flow, abs=2e-4)
 
 
 @pytest.mark.parametrize(("number", "text"), [(0.5, "0.500E+00"), (-12.0, "-0.120E+02"), (0.0, "0.000E+00")])
