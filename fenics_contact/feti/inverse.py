@@ -27,8 +27,8 @@ from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_do
 class ExplicitOperator:
     """(K⁺)_bb and S as packed triangles; S, used only for preconditioning, in single precision.
 
-    In double precision, too, where foundations alone resist some motion, so little that S loses definiteness
-    in single precision: that of a stiff body on a soft bed.
+    In double precision, too, where some motion has so little energy that S loses definiteness in single
+    precision: that of a stiff body on a soft bed, or of a slender bar that bends.
 
     Where many subdomains are alike, as whole matrices: one product then reads them once for all.
 
@@ -61,7 +61,7 @@ class ExplicitOperator:
         self._stiff = _packed((schur / self._unit).astype(np.float32, order="F"))
         factor = regular_factor(schur, subdomain.kernel[interface], subdomain.typical_stiffness)
         self._flexible = _packed(lapack.dpotri(factor.lower, lower=1, overwrite_c=1)[0])
-        if subdomain.foundations and factor.least < single:
+        if factor.least < single:
             schur = condensations.schur_complement(stiffness, interface)
             self._stiff = _packed(np.asfortranarray(schur / self._unit))
         self._size = len(interface)
