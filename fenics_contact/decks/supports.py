@@ -192,17 +192,22 @@ class SupportBuilder:
         along = np.eye(6, 3)[component]
         for place in np.flatnonzero(axes.turned(node) & (component < 3)):
             along[place] = axes.of(int(node[place]))[component[place]]
-        found = []
-        for body in self.built.meshes:
-            mine, inner = parts.within(body, np.unique(node))
+        used, place = np.unique(node, return_inverse=True)
+        owner, own = np.full((2, len(used)), -1)
+        for k, body in enumerate(self.built.meshes):
+            mine, inner = parts.within(body, used)
             owned = parts.owned(body, mine)
-            mine, inner = mine[owned], inner[owned]
-            here = np.flatnonzero(np.isin(node, mine) & (component < 3))
-            if len(here):
-                own = inner[np.searchsorted(mine, node[here])]
-                vectors = along[here, : self.built.deck.dim]
-                found.append(ConstraintTerm(body, own, vectors, factor[here], number[here]))
-        return found
+            at = np.searchsorted(used, mine[owned])
+            owner[at], own[at] = k, inner[owned]
+        of = np.where(component < 3, owner[place], -1)
+        order = np.argsort(of, kind="stable")
+        ends = np.searchsorted(of[order], np.arange(len(self.built.meshes) + 1))
+        vectors = along[:, : self.built.deck.dim]
+        return [
+            ConstraintTerm(body, own[place[here]], vectors[here], factor[here], number[here])
+            for body, here in zip(self.built.meshes, np.split(order, ends)[1:], strict=False)
+            if len(here)
+        ]
 
     def values(self, instant: Instant) -> Mapping[str, Any] | None:
         """Return the values of equations at a time, of nodes without elements; None without any."""

@@ -259,12 +259,12 @@ def _differences(matrix: sp.csr_matrix, most: int = 12) -> sp.csr_matrix:
     `most`: rows that may share one: so many are a small block.
     """
     whole = sp.identity(matrix.shape[0], format="csr")
-    # Rows longer than they are many, as of knots of beams, fill the block without that one, too.
+    # Long rows, as of knots of beams, fill the block without that one, too, and would be lost in differences.
     length = np.repeat(np.diff(matrix.indptr), np.diff(matrix.indptr))
     count = np.bincount(matrix.indices, minlength=matrix.shape[1])
     longest = np.zeros(matrix.shape[1], dtype=length.dtype)
     np.maximum.at(longest, matrix.indices, length)
-    busy = np.flatnonzero(count > np.maximum(most, longest))
+    busy = np.flatnonzero(count > np.maximum(most, 2 * longest))
     for column in busy:  # those that many rows share are few
         entries = matrix[:, [column]].tocoo()
         # Large factors are last: a row to which many times the next one is added would be lost in it.

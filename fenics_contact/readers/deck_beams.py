@@ -1,7 +1,7 @@
 """Beams of a deck as rows of solid cells, as CalculiX expands them.
 
-At a node the elements whose tangents and directions 2 differ by less than 20 degrees, and which have the same
-section, share the nodes around the section. Others have nodes of their own there.
+At a node two elements, one after the other, whose tangents and directions 2 differ by less than 20 degrees,
+and which have the same section, share the nodes around it. Others have nodes of their own there.
 """
 
 from __future__ import annotations
@@ -122,13 +122,13 @@ def _expanded(mesh: DeckMesh, places: Sequence[int], sections: _Sections) -> Dec
 
 @dataclass(frozen=True, eq=False)
 class _Incidences:
-    """Nodes of elements one by one: node, tangent and direction 2 there, element, whether it is an end."""
+    """Nodes of elements one by one: node, tangent and direction 2 there, element, place in this."""
 
     node: np.ndarray
     tangent: np.ndarray
     second: np.ndarray
     element: np.ndarray
-    end: np.ndarray
+    place: np.ndarray
     sections: _Sections
 
     @classmethod
@@ -151,20 +151,28 @@ class _Incidences:
                     f"element {number} has no length, or lies along direction 1 of its section, which is "
                     "(0, 0, -1) by default: give another one in the second line of *BEAM SECTION"
                 )
-            rows.append((own.ravel(), tangent, second / size, element, np.arange(own.size) % 3 != 1))
-        node, tangent, second, element, end = (np.concatenate(each) for each in zip(*rows, strict=True))
-        return cls(node, tangent, second, element, end, sections)
+            rows.append((own.ravel(), tangent, second / size, element, np.arange(own.size) % 3))
+        node, tangent, second, element, place = (np.concatenate(each) for each in zip(*rows, strict=True))
+        return cls(node, tangent, second, element, place, sections)
 
     def grouped(self, alike: float = np.cos(np.radians(20.0))) -> np.ndarray:
-        """Return the number of the section that each has; `alike`: as for shells."""
+        """Return the number of the section that each has; `alike`: as for shells.
+
+        CalculiX lets any number of elements share a section, here a face has two cells at most.
+        """
         of, all_of = self.element, self.sections
         kind = np.column_stack([all_of.size[of], all_of.offset[of], all_of.is_round[of]])
 
         def fits(rest: np.ndarray, first: np.ndarray) -> np.ndarray:
-            same = (kind[rest] == kind[first]).all(axis=1)
+            same = (kind[rest] == kind[first]).all(axis=1) & (
+                np.abs(self.place[rest] - self.place[first]) == 2
+            )
             for each in (self.tangent, self.second):
                 same &= np.einsum("nd,nd->n", each[rest], each[first]) > alike
-            return same
+            next_one = np.flatnonzero(same)[np.unique(self.node[rest[same]], return_index=True)[1]]
+            found = rest == first
+            found[next_one] = True
+            return np.asarray(found)
 
         return first_come(self.node, fits)
 
@@ -181,7 +189,7 @@ class _Incidences:
         across -= np.einsum("nd,nd->n", across, along)[:, None] * along
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         end = np.zeros(count, dtype=bool)
-        end[group[self.end]] = True
+        end[group[self.place != 1]] = True
         node, of = self.node[first], self.element[first]
         sections = self.sections
         size, is_corner = sections.size[of], np.arange(8) % 2 == 0

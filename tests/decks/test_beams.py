@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -204,6 +205,40 @@ def test_joints_in_a_plane_stretch_in_two_ways(tmp_path: Path) -> None:
         assert np.abs(motions.joints @ field.ravel()).max() < 1e-12
         field[:, [0, 2]] = 0.0
         assert (np.abs(motions.joints @ field.ravel()).max() < 1e-12) == (count == 8)
+
+
+def test_a_lattice_of_slender_single_bars_is_solved(tmp_path: Path) -> None:
+    """Bending has 1e-8 of the energy of other motions: in single precision their stiffness is indefinite."""
+    corners = [(x, y, z) for x in (0, 10) for y in (0, 10) for z in (0, 10)]
+    _, moved, _ = solved(tmp_path, lattice_text(corners))
+    np.testing.assert_allclose(moved[8], LATTICE, atol=2e-6 * np.abs(LATTICE).max())
+
+
+def lattice_text(points: Sequence[tuple[int, int, int]]) -> str:
+    """Bars between all points."""
+    bars = list(combinations(range(len(points)), 2))
+    section = ["RECT\n0.5, 0.2\n-0.15433221, -0.83205029, 0.55470020"]
+    last = len(points)
+    held = "1, 1, 3\n2, 1, 3\n3, 1, 3"
+    return text_of(points, bars, held, f"*CLOAD\n{last}, 3, 1.\n{last}, 2, 0.7", section, kind="B32R", per=1)
+
+
+#: What CalculiX prints for the last corner of the lattice.
+LATTICE = (-1.147097e-03, 8.633033e-04, 1.110619e-03)
+
+
+def test_members_that_leave_a_node_in_one_direction_have_sections_of_their_own(tmp_path: Path) -> None:
+    """CalculiX lets all three share one, here no more than two cells have a face in common."""
+    points = [(0, 0, 0), (100, 0, 0), (200, 0, 0)]
+    text = text_of(points, [(0, 1), (1, 2), (0, 2)], CLAMPED, "*CLOAD\n3, 3, 1.", per=2)
+    deck, moved, _ = solved(tmp_path, text)
+    assert len(deck.scene.bodies) == 2
+    sags = []
+    for members in ([(0, 1), (1, 2)], [(0, 1)]):
+        ends = points if len(members) == 2 else points[::2]
+        load = f"*CLOAD\n{len(ends)}, 3, 1."
+        sags.append(solved(tmp_path, text_of(ends, members, CLAMPED, load, per=2))[1][len(ends)][2])
+    assert moved[3][2] == pytest.approx(1 / (1 / sags[0] + 1 / sags[1]), rel=0.02)
 
 
 def ring_text() -> str:
