@@ -109,7 +109,8 @@ class _Naming:
             inner = [k for k in target.components if k < deck.dim]
             _check_target(deck, self.steps, target, nodes)
             if not len(nodes):
-                if not deck.references[target.nodes].any():
+                ends = [node for each in deck.springs for node in each.nodes]
+                if not (deck.references[target.nodes].any() or np.isin(target.nodes, ends).any()):
                     deck.note(target.card, f"nodes {target.label} belong to no element")
             elif not target.label or target.label.isdecimal():
                 single[np.ix_(nodes, inner)] = True
