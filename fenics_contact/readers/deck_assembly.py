@@ -18,15 +18,12 @@ from fenics_contact.readers.deck_parameters import with_parameters
 
 FRAMES = {"PART", "ENDPART", "ASSEMBLY", "ENDASSEMBLY", "INSTANCE", "ENDINSTANCE"}
 """The cards that make up the structure."""
-_IN_PARTS = {
-    "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "SOLIDSECTION", "SHELLSECTION", "ORIENTATION",
-    "HOURGLASSSTIFFNESS",
-}  # fmt: skip
 #: Parameters that name what belongs to a part.
 _NAMES = {
     "NODE": ("NSET",), "ELEMENT": ("ELSET",), "NSET": ("NSET", "ELSET"), "ELSET": ("ELSET",),
     "SURFACE": ("NAME",), "SOLIDSECTION": ("ELSET", "ORIENTATION"), "ORIENTATION": ("NAME",),
-    "SHELLSECTION": ("ELSET", "ORIENTATION"),
+    "SHELLSECTION": ("ELSET", "ORIENTATION"), "BEAMSECTION": ("ELSET", "ORIENTATION"),
+    "HOURGLASSSTIFFNESS": (),
 }  # fmt: skip
 
 
@@ -209,7 +206,7 @@ def _opened(deck: _Deck, card: Card) -> list[Card]:
 
 def _of_instance(card: Card, instance: _Instance, instances: Instances) -> Card:
     """Return a card of a part as that of an instance."""
-    if card.name not in _IN_PARTS:
+    if card.name not in _NAMES:
         raise card.error("this card is not supported within a part: give it in the assembly or behind it")
     parameters, offset = dict(card.parameters), instances.offset(instance.name)
     for name in _NAMES.get(card.name, ()):
@@ -227,6 +224,8 @@ def _of_instance(card: Card, instance: _Instance, instances: Instances) -> Card:
         lines = _members(card, instance.name, offset, instances.stride)
     elif card.name == "ORIENTATION":
         lines = _turned(card, instance)
+    elif card.name == "BEAMSECTION":
+        lines = _turned_section(card, instance)
     return replace(card, parameters=parameters, lines=lines)
 
 
@@ -260,6 +259,14 @@ def _turned(card: Card, instance: _Instance) -> list[str]:
         points = instance.moved(points)
     first = ", ".join(repr(float(x)) for x in [*points.ravel(), *given[6:]])
     return [first, *card.lines[1:]]
+
+
+def _turned_section(card: Card, instance: _Instance) -> list[str]:
+    """Return the lines of a section of beams, whose direction 1 turns with its instance."""
+    given = card.floats(1) if len(card.lines) > 1 else [0.0, 0.0, -1.0]
+    if not card.lines or len(given) != 3 or np.array_equal(instance.turn, np.eye(3)):
+        return list(card.lines)
+    return [card.lines[0], ", ".join(repr(float(x)) for x in instance.turn @ np.array(given))]
 
 
 def _resolved(card: Card, instances: Instances, assembly: str) -> Card:

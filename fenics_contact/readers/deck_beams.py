@@ -74,9 +74,10 @@ class _Sections:
 
     def _read(self, card: Card, elements: np.ndarray) -> None:
         """Keep what a card says of some elements."""
-        kind = card.required("SECTION")
+        kind = card.required("SECTION")[:4]
         if kind not in ("RECT", "CIRC"):
-            raise card.error(f"SECTION must be RECT or CIRC, got {kind}: mesh the part with solid elements")
+            got = card.name_of("SECTION")
+            raise card.error(f"SECTION must be RECT or CIRC, got {got}: mesh the part with solid elements")
         given = card.floats(0)[:2] if card.lines else []
         if not given or not min(given) > 0:
             got = " and ".join(f"{each:g}" for each in given) or "none"

@@ -402,6 +402,23 @@ def test_mistakes_about_beams_are_refused_at_their_lines(old: str, new: str, mes
         read_deck(tmp_path / "beam.inp")
 
 
+@pytest.mark.parametrize("direction", ["\n0., 1., 0.", ""])
+def test_sections_in_parts_turn_with_their_instances(direction: str, tmp_path: Path) -> None:
+    text = case_text("default direction").replace("RECT\n10.", f"RECTANGULAR\n10., 4.{direction}")
+    moved = solved(tmp_path, text)[1][2]
+    model, steps = text.split("*BOUNDARY")
+    mesh, material = model.split("*MATERIAL")
+    material, section = material.split("*BEAM")
+    where = "*END PART\n*ASSEMBLY, NAME=A\n*INSTANCE, NAME=I, PART=P\n"
+    where += "0., 0., 0.\n0., 0., 0., 1., 0., 0., 90.\n*END INSTANCE\n*NSET, NSET=NALL, INSTANCE=I\n1, 2\n"
+    steps = steps.replace("1, 1, 6", "I.1, 1, 6").replace("2, 3, 10.\n2, 2, 5.", "I.2, 2, -10.\nI.2, 3, 5.")
+    turned = f"*PART, NAME=P\n{mesh}*BEAM{section}{where}*END ASSEMBLY\n*MATERIAL{material}*BOUNDARY{steps}"
+    (tmp_path / "beam.inp").write_text(turned)
+    deck = read_deck(tmp_path / "beam.inp")
+    table, _ = deck.tables(deck.solve(MPI.COMM_WORLD, tolerance=1e-8)[-1])
+    np.testing.assert_allclose(table.rows[1, [1, 3, 2]] * (1, 1, -1), moved, atol=1e-6)
+
+
 def test_beams_along_the_default_direction_need_another_one(tmp_path: Path) -> None:
     text = text_of([(0, 0, 0), (0, 0, 100)], [(0, 1)], CLAMPED, "*CLOAD\n2, 1, 1.", ["RECT\n10., 4."])
     with pytest.raises(
