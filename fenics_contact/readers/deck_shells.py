@@ -91,8 +91,8 @@ class _Depths:
             found._check(mesh, mesh.blocks[place])
         return found
 
-    def _check(self, mesh: DeckMesh, block: Block) -> None:
-        """Refuse shells without a thickness."""
+    def _check(self, mesh: DeckMesh, block: Block, least: float = 1e-7) -> None:
+        """Refuse shells without a thickness, or with ``least`` of their size, whose bending is rounding."""
         mine = slice(block.first, block.first + len(block.nodes))
         lost = np.flatnonzero(np.isnan(self.thickness[mine]))
         if len(lost):
@@ -103,6 +103,12 @@ class _Depths:
         if len(bare):
             number = block.card.label(mesh.numbers[bare[0]])
             raise block.card.error(f"node {number} has no *NODAL THICKNESS, which its section names: add it")
+        size = np.ptp(mesh.points[block.nodes], axis=1).max(axis=1)
+        thin = np.flatnonzero(self.thickness[mine] < least * size)
+        if len(thin):
+            number = block.card.label(block.numbers[thin[0]])
+            words = f"element {number} is {size[thin[0]]:g} long and {self.thickness[mine][thin[0]]:g} thick"
+            raise block.card.error(f"{words}: it bends within rounding; give more, or load the face below it")
 
 
 def _positive(card: Card, row: int, given: Sequence[float]) -> float:

@@ -287,6 +287,7 @@ PRESSED = text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.")
     [
         ("\n4.0\n", "\n0.\n", r"the thickness must be above zero, got 0: give it"),
         ("\n4.0\n", "\n", r"the thickness must be above zero, got none: give it"),
+        ("\n4.0\n", "\n1e-9\n", r"element 1 is 10 long and 1e-09 thick: it bends within rounding"),
         ("*SHELL SECTION, ELSET=ALL, MATERIAL=M\n4.0\n", "", r"element 1 has no \*SHELL SECTION"),
         ("*SHELL SECTION", "*SOLID SECTION", r"element 1 has no \*SHELL SECTION"),
         ("MATERIAL=M\n4.0", "MATERIAL=M, NODAL THICKNESS\n4.0", r"node \d+ has no \*NODAL THICKNESS"),
@@ -300,6 +301,7 @@ PRESSED = text_of(PLATE[0], {"S8R": PLATE[1]}, CLAMPED, "*DLOAD\nALL, P, 1.")
             "*END STEP\n*STEP\n*STATIC\n*BOUNDARY\n43, 3\n*END STEP\n",
             r"held alike in all steps",
         ),
+        ("*STEP\n", "*SURFACE, NAME=W\nALL,\n*STEP\n", r"needs a face S1, S2, ... .*, got 'nothing'"),
         (
             "*STEP\n",
             "*RIGID BODY, ELSET=ALL, REF NODE=43\n*STEP\n",
