@@ -239,7 +239,8 @@ class Safeguards:
     whether floating bodies are equilibrated also where the face holds them all; `balanced`: imbalance up to
     which an iterate counts as in equilibrium; steps from others are not cut; `stuck`: part of a step after
     which the next one is not cut on the same face; `rounded`: where products are in single precision, least
-    tolerance of a face relative to the residual.
+    tolerance of a face relative to the residual; `flickering`: share of the statuses that change which change
+    back, from which a face is solved more accurately, by the factor `doubt`.
     """
 
     shorten: Callable[[DualProblem, Iterate, Iterate, Sequence[Residuals]], Damped[Iterate]] = shorten
@@ -250,6 +251,8 @@ class Safeguards:
     balanced: float = 1e-6
     stuck: float = 0.01
     rounded: float = 1e-5
+    flickering: float = 0.4
+    doubt: float = 0.003
 
 
 @dataclass(frozen=True, eq=False)
@@ -400,8 +403,8 @@ class FaceSteps:
         # (b) The face that the natural map selects, and the number of status changes since the last one.
         pressing = state.pressing(self.problem)
         step, face = self._next_face(state, pressing)
-        count = face.changes(state.faces[0]) if state.faces else 0
-        changed = round(float(global_sum(self.problem.comm, count)[0]))
+        changed, flickers = self._changes((face, *state.faces))
+        care *= self.safeguards.doubt if flickers else 1.0
         # (a), (c) Its solution, as accurate as the last face's prediction warrants.
         mismatch = np.inf if changed else state.mismatch
         tolerance = self.forcing.by_prediction(before.residuals, mismatch, care)
@@ -423,6 +426,20 @@ class FaceSteps:
         faces = (replace(face), *state.faces[: self.safeguards.longest_cycle])
         following = FaceState(taken.point, step, faces, mismatch, (before.residuals,), taken.fraction)
         return following, self._record(number, taken, solved, changed)
+
+    def _changes(self, faces: Sequence[Face]) -> tuple[int, bool]:
+        """Return how many statuses change, and whether many of them change back, twice in turn. Collective.
+
+        Then a face is solved less accurately than what touches there is small, as at the edges of thin
+        plates that press each other, or even without any force, and statuses are those of rounding.
+        """
+        pairs = [(0, 1), (0, 2), (1, 2), (1, 3), (2, 3)]
+        counts = [faces[i].changes(faces[j]) if j < len(faces) else 0 for i, j in pairs]
+        now, two, last, two_last, first = global_sum(self.problem.comm, *counts)
+        back = now + last - two, last + first - two_last  # twice those of this step and of the last one
+        share = 2.0 * self.safeguards.flickering
+        flickers = len(faces) > 3 and back[0] > share * now and back[1] > share * last
+        return round(float(now)), bool(flickers)
 
     def _next_face(self, state: FaceState, pressing: Vector) -> tuple[Vector, Face]:
         """Classify, with a smaller ρ for discs whose force would otherwise reverse."""
