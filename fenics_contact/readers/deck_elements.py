@@ -72,6 +72,11 @@ class Element:
         return False
 
     @property
+    def outer(self) -> int:
+        """Number of the faces that may be outside of what elements make up."""
+        return len(self.faces)
+
+    @property
     def instead(self) -> str:
         """Type as which it is solved, and why, where that is another one."""
         return ""
@@ -156,6 +161,11 @@ class Shell(Element):
         return 3
 
     @property
+    def outer(self) -> int:
+        """None: which side is meant must be said."""
+        return 0
+
+    @property
     def faces(self) -> Sequence[Sequence[int]]:
         """Positions of the corners of both sides, and of its edges."""
         corners = tuple(range(3 if self.count in (3, 6) else 4))
@@ -174,6 +184,11 @@ class Beam(Element):
     def dim(self) -> int:
         """Dimension of its space."""
         return 3
+
+    @property
+    def outer(self) -> int:
+        """None: which side is meant must be said."""
+        return 0
 
     @property
     def faces(self) -> Sequence[Sequence[int]]:

@@ -345,7 +345,7 @@ def _surface(mesh: DeckMesh, card: Card) -> Named:
     for k, row in enumerate(card.rows):
         elements = mesh.elements_named(row[0], card, k)
         label = row[1].upper() if len(row) > 1 else ""
-        if not label and not any(mesh.blocks[n].element.kind == "shell" for n in mesh.block_of[elements]):
+        if not label and all(mesh.blocks[n].element.outer for n in mesh.block_of[elements]):
             parts.append(_outer(mesh, elements))
             continue
         if label[:1] not in ("S", "E"):
@@ -356,8 +356,7 @@ def _surface(mesh: DeckMesh, card: Card) -> Named:
 
 def _outer(mesh: DeckMesh, elements: np.ndarray) -> Faces:
     """Return the faces of elements that no other element of the deck shares, as in Abaqus."""
-    sides = [len(block.element.faces) * (block.element.kind != "shell") for block in mesh.blocks]
-    sides = np.array(sides)[mesh.block_of]
+    sides = np.array([block.element.outer for block in mesh.blocks])[mesh.block_of]
     every = np.repeat(np.arange(len(sides)), sides)
     faces = Faces(every, np.arange(len(every)) - np.repeat(np.cumsum(sides) - sides, sides))
     corners = np.full((len(faces), 4), -1)

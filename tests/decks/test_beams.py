@@ -387,6 +387,7 @@ def test_jobs_print_displacements_of_the_nodes_of_beams(tmp_path: Path) -> None:
             "element 1 has no length, or lies along direction 1 of its section",
         ),
         ("*BEAM SECTION", "*SOLID SECTION", r"the parameter SECTION is not read"),
+        ("*STEP\n", "*SURFACE, NAME=W\nPART,\n*STEP\n", r"needs a face S1, S2, ... .*, got 'nothing'"),
         ("*BEAM SECTION, ELSET=M0", "*BEAM SECTION, ELSET=PART", r"element 2 has no \*BEAM SECTION with its"),
         ("*BEAM SECTION", "*BEAM GENERAL SECTION", "pipes and boxes are not solved here"),
         ("TYPE=B32", "TYPE=B33", r"elements of type B33, beams, are not supported: .* beams \(B31, B32\)"),
