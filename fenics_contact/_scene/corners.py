@@ -9,10 +9,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import SceneParts, sharp_at, surface_of
 from fenics_contact._surfaces.corners import corners_over
+from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import project
 from fenics_contact.mesh.faces import computed_rounding
 
@@ -41,8 +43,31 @@ def _touches_with_a_corner(scene: SceneParts, side: Surface, other: Surface) -> 
     if not len(sharp):
         return False
     own, opposite = (surface_of(scene, each, "faceted") for each in (side, other))
-    _, hit = corners_over(own, sharp, opposite)
-    if not len(hit.point):
+    nearest, apart = _least_gap(own, opposite)
+    rounding = computed_rounding(own.points)
+    sharp = sharp[apart[sharp] <= abs(nearest) + rounding]
+    if not len(sharp) or np.isinf(nearest):
         return False
-    nearest = project(own.points, own.normals, opposite).gap.min()
-    return bool(hit.gap.min() <= nearest + computed_rounding(own.points))
+    _, hit = corners_over(own, sharp, opposite)
+    return bool(hit.gap.min(initial=np.inf) <= nearest + rounding)
+
+
+def _least_gap(own: FacetedSurface, other: FacetedSurface, first: int = 100) -> tuple[float, np.ndarray]:
+    """Return the least gap of nodes over another surface, infinite if none lies over it, and lower bounds.
+
+    Surfaces may be far from each other in most places: the nodes nearest to facets come first, then those
+    that may be nearer than what was found. The bounds are below the distances of all nodes, shape (n,).
+    `first`: number of the first nodes.
+    """
+    corners = other.points[other.facets]
+    middle = corners.mean(axis=1)
+    # Twice the size of facets: true surfaces are above or below them.
+    size = 2.0 * float(np.linalg.norm(corners - middle[:, None], axis=2).max(initial=0.0))
+    apart = cKDTree(middle).query(own.points)[0] - size
+    within = float(np.sort(apart)[:first][-1])
+    while True:
+        near = apart <= within
+        gap = float(project(own.points[near], own.normals[near], other).gap.min(initial=np.inf))
+        if abs(gap) <= within or near.all():
+            return gap, apart
+        within = abs(gap)
