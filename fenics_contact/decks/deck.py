@@ -109,7 +109,12 @@ class Deck:
         return self._origins
 
     def problem(self, comm: MPI.Comm, **settings: Any) -> ContactProblem:
-        """Return the problem before the first step, unsolved; settings are those of `ContactProblem`."""
+        """Return the problem before the first step, unsolved; settings are those of `ContactProblem`.
+
+        With beams the tolerance is 1e-6 by default.
+        """
+        if not {"solver", "tolerance"} & settings.keys():
+            settings["tolerance"] = self._shells.tolerance
         return ContactProblem(self.scene, comm, **settings)
 
     def solve(self, comm: MPI.Comm, **settings: Any) -> list[State]:

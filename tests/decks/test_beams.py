@@ -256,6 +256,13 @@ def ring_text() -> str:
 RING = 0.1320222
 
 
+def test_frames_are_solved_sharply_by_default(tmp_path: Path) -> None:
+    (tmp_path / "beam.inp").write_text(frame_text("in space"))
+    deck = read_deck(tmp_path / "beam.inp")
+    assert deck.problem(MPI.COMM_WORLD).tolerance == 1e-6
+    assert deck.problem(MPI.COMM_WORLD, tolerance=1e-3).tolerance == 1e-3
+
+
 def test_a_cantilever_and_a_ring_have_the_deflections_of_theory(tmp_path: Path) -> None:
     """A slender one, and a quarter of a ring of radius 100, pinched at the end of its diameter.
 
