@@ -59,9 +59,13 @@ def agreement(deck: Deck, states: Sequence[State], blocks: Sequence[Block]) -> A
 Pairs = list[tuple[np.ndarray, np.ndarray]]
 
 
-def _places(deck: Deck, body: str, block: Block) -> tuple[np.ndarray, np.ndarray]:
-    """Return which rows of a block are nodes of a body, and their numbers in it."""
-    numbers = deck.node_numbers[body]
+def _places(deck: Deck, body: str, block: Block, every: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which rows of a block are nodes of a body, and their numbers in it.
+
+    ``every``: numbers of all nodes of the deck. Those of shells are left out, and nodes across them.
+    """
+    known = every[~deck.are_of_shells(every)]
+    numbers = np.where(np.isin(deck.node_numbers[body], known), deck.node_numbers[body], 0)
     order = np.argsort(numbers, kind="stable")
     place = np.minimum(np.searchsorted(numbers[order], block.labels[:, 0]), len(numbers) - 1)
     rows = np.flatnonzero(numbers[order][place] == block.labels[:, 0])
@@ -70,23 +74,27 @@ def _places(deck: Deck, body: str, block: Block) -> tuple[np.ndarray, np.ndarray
 
 def _moved(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
     """Return displacements, own and CalculiX's."""
-    pairs = []
+    pairs, every = [], deck.of_nodes("", state, "U")
+    shells = every[deck.are_of_shells(every[:, 0])]
     for body in deck.node_numbers:
         own = state.gather_displacement(body)
         for block in blocks:
-            rows, nodes = _places(deck, body, block)
+            rows, nodes = _places(deck, body, block, every[:, 0])
             # Nodes of a section are there twice, and either program may keep the number on another side.
             cuts = state.scene.bodies[body].mesh.cuts.values()
             whole = (
                 ~np.isin(nodes, np.concatenate([cut.pairs.ravel() for cut in cuts])) if cuts else slice(None)
             )
             pairs.append((own[nodes][whole], block.values[rows][:, : own.shape[1]][whole]))
+    for block in blocks:  # bodies have the nodes across their thickness instead
+        _, own_rows, rows = np.intersect1d(shells[:, 0], block.labels[:, 0], return_indices=True)
+        pairs.append((shells[own_rows, 1:], block.values[rows][:, : shells.shape[1] - 1]))
     return pairs
 
 
 def _held(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
     """Return forces on nodes along the components that supports hold, own and CalculiX's."""
-    scene, forces = state.scene, state._nodal_forces
+    scene, forces, every = state.scene, state._nodal_forces, deck.of_nodes("", state, "U")[:, 0]
     heated = any(isinstance(load, ThermalStrain) for load in scene.loads)
     tearing = state.torn.decomposition.tearing
     pairs = []
@@ -109,7 +117,7 @@ def _held(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
         held[scene.bodies[body].on_axis, 0] = False
         for block in blocks:
             if block.labels.shape[1] == 1:
-                rows, nodes = _places(deck, body, block)
+                rows, nodes = _places(deck, body, block, every)
                 chosen = held[nodes]
                 theirs = block.values[rows][:, : own.shape[1]]
                 factor = 1.0 / SECTORS if scene.axisymmetric and block.place else deck.thickness
@@ -131,6 +139,7 @@ def _stressed(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
             block
             for block in blocks
             if block.labels.shape[1] == 2 and np.isin(block.labels[:, 0], numbers).any()
+            if block.values.shape[1] == 6  # else the name of local axes is behind them, as of shells
         ]
         if not printed:
             continue
