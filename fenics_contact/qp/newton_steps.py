@@ -240,7 +240,7 @@ class Safeguards:
     which an iterate counts as in equilibrium; steps from others are not cut; `stuck`: part of a step after
     which the next one is not cut on the same face; `rounded`: where products are in single precision, least
     tolerance of a face relative to the residual; `flickering`: share of the statuses that change which change
-    back, from which a face is solved more accurately, by the factor `doubt`.
+    back, from which, without progress, a face is solved more accurately, by the factor `doubt`.
     """
 
     shorten: Callable[[DualProblem, Iterate, Iterate, Sequence[Residuals]], Damped[Iterate]] = shorten
@@ -404,7 +404,8 @@ class FaceSteps:
         pressing = state.pressing(self.problem)
         step, face = self._next_face(state, pressing)
         changed, flickers = self._changes((face, *state.faces))
-        care *= self.safeguards.doubt if flickers else 1.0
+        stalls = any(before.residuals.worst > 0.5 * each.worst for each in state.earlier)
+        care *= self.safeguards.doubt if flickers and stalls else 1.0
         # (a), (c) Its solution, as accurate as the last face's prediction warrants.
         mismatch = np.inf if changed else state.mismatch
         tolerance = self.forcing.by_prediction(before.residuals, mismatch, care)

@@ -252,8 +252,9 @@ class Row(Layer):
 
 #: Faces of shells that have names, of edges those of Abaqus; a pressure without a number acts on the first.
 _SIDES = {"SNEG": 0, "SPOS": 1, "P": 0, "E1": 2, "E2": 3, "E3": 4, "E4": 5}
-#: Types of shells and beams with the number of their nodes.
+#: Types of shells with the number of their nodes.
 _SHELLS = {"S3": 3, "S3R": 3, "S4": 4, "S4R": 4, "S6": 6, "S8": 8, "S8R": 8}
+#: Types of beams with the number of their nodes.
 _BEAMS = {"B31": 2, "B31R": 2, "B32": 3, "B32R": 3}
 #: Faces of the cells of beams by their labels: pressures along directions 1 and 2, and sides of surfaces.
 _ACROSS = {"P1": 0, "P2": 4, "S1": 0, "S2": 1, "S3": 2, "S5": 4}

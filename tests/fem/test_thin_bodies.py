@@ -180,10 +180,10 @@ def test_two_plates_in_contact_share_the_load_by_one_layer_of_reduced_cells(mu) 
 
 @pytest.mark.filterwarnings("ignore")
 def test_statuses_that_flicker_are_settled_by_faces_solved_more_accurately() -> None:
-    """At the rims of two thin plates nothing presses; by faces solved to a quarter it took 4659 products."""
-    scene, _, pressure = two_plates(12, 1.0, "full")
+    """At the rims of two thin plates nothing presses; by faces solved to a quarter it took 1852 products."""
+    scene, _, pressure = two_plates(12, 1.0)
     state = solve_scene(scene, MPI.COMM_WORLD, tolerance=1e-7)
-    assert state.solution.products <= 1500
+    assert state.solution.products <= 1200
     assert np.median(state.contact.pressure) == pytest.approx(0.5 * pressure, rel=0.02)
 
 
