@@ -83,7 +83,7 @@ core := tests/dolfinx $(addprefix tests/pairing/test_, patch.py quadratic_cells.
   $(addprefix tests/equilibrium/test_, coulomb.py hertz.py ranks.py) \
   tests/design/test_adjoint.py tests/design/test_derivatives.py tests/materials/test_hyperelasticity.py \
   tests/large_deformations/test_sliding.py $(addprefix tests/readers/test_, dolfinx_import.py meshio_import.py \
-  gmsh_import.py) tests/house/test_starting.py
+  gmsh_import.py) tests/decks/test_composites.py tests/house/test_starting.py
 
 test-core: $(prepare) ## Run the most telling tests: patches, Coulomb, derivatives, large deformations, meshes, ranks
 	$(quick) $(core)
