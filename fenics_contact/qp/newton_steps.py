@@ -239,8 +239,8 @@ class Safeguards:
     whether floating bodies are equilibrated also where the face holds them all; `balanced`: imbalance up to
     which an iterate counts as in equilibrium; steps from others are not cut; `stuck`: part of a step after
     which the next one is not cut on the same face; `rounded`: where products are in single precision, least
-    tolerance of a face relative to the residual; `flickering`: share of the statuses that change which change
-    back, from which, without progress, a face is solved more accurately, by the factor `doubt`.
+    tolerance of a face relative to the residual; `flickering`: share of the contacts that open or close which
+    go back, from which, without progress, a face is solved more accurately, by the factor `doubt`.
     """
 
     shorten: Callable[[DualProblem, Iterate, Iterate, Sequence[Residuals]], Damped[Iterate]] = shorten
@@ -403,7 +403,9 @@ class FaceSteps:
         # (b) The face that the natural map selects, and the number of status changes since the last one.
         pressing = state.pressing(self.problem)
         step, face = self._next_face(state, pressing)
-        changed, flickers = self._changes((face, *state.faces))
+        count = face.changes(state.faces[0]) if state.faces else 0
+        changed = round(float(global_sum(self.problem.comm, count)[0]))
+        flickers = self._flickers((face, *state.faces))
         stalls = any(before.residuals.worst > 0.5 * each.worst for each in state.earlier)
         care *= self.safeguards.doubt if flickers and stalls else 1.0
         # (a), (c) Its solution, as accurate as the last face's prediction warrants.
@@ -428,19 +430,19 @@ class FaceSteps:
         following = FaceState(taken.point, step, faces, mismatch, (before.residuals,), taken.fraction)
         return following, self._record(number, taken, solved, changed)
 
-    def _changes(self, faces: Sequence[Face]) -> tuple[int, bool]:
-        """Return how many statuses change, and whether many of them change back, twice in turn. Collective.
+    def _flickers(self, faces: Sequence[Face]) -> bool:
+        """Return whether many of the contacts that open or close go back, twice in turn. Collective.
 
         Then a face is solved less accurately than what touches there is small, as at the edges of thin
         plates that press each other, or even without any force, and statuses are those of rounding.
         """
-        pairs = [(0, 1), (0, 2), (1, 2), (1, 3), (2, 3)]
-        counts = [faces[i].changes(faces[j]) if j < len(faces) else 0 for i, j in pairs]
-        now, two, last, two_last, first = global_sum(self.problem.comm, *counts)
-        back = now + last - two, last + first - two_last  # twice those of this step and of the last one
-        share = 2.0 * self.safeguards.flickering
-        flickers = len(faces) > 3 and back[0] > share * now and back[1] > share * last
-        return round(float(now)), bool(flickers)
+        if len(faces) < 4:
+            return False
+        now, last, before, first = (each.closed for each in faces[:4])
+        changes = now != last, last != before
+        counts = [changes[0], changes[0] & (now == before), changes[1], changes[1] & (last == first)]
+        found = global_sum(self.problem.comm, *map(np.count_nonzero, counts))
+        return bool((found[1::2] > self.safeguards.flickering * found[::2]).all())
 
     def _next_face(self, state: FaceState, pressing: Vector) -> tuple[Vector, Face]:
         """Classify, with a smaller ρ for discs whose force would otherwise reverse."""

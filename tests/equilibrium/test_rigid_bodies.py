@@ -46,7 +46,7 @@ def test_the_default_solves_every_published_problem(case: str) -> None:
 
 
 def test_springs_of_other_stiffness_free_a_stuck_newton(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem, mu_f = rigid_problem(7)
+    problem, mu_f = rigid_problem(118)
     solver = FaceNewton(tolerance=TOLERANCE, max_products=6_000)
     found = solve(problem, None, solver, friction_coefficient=mu_f)
     assert sum(step.method == "proximal rescue" for step in found.history) > 4
