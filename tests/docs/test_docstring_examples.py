@@ -105,6 +105,8 @@ def unknown_names(code: str, globs: dict[str, Any]) -> list[str]:
     nodes = list(ast.walk(ast.parse(code)))
     names = [node for node in nodes if isinstance(node, ast.Name)]
     made = {node.id for node in names if isinstance(node.ctx, ast.Store)}
+    imports = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+    made |= {each.asname or each.name for node in imports for each in node.names}
     made |= {node.arg for node in nodes if isinstance(node, ast.arg)}
     made |= {str(node.name) for node in nodes if isinstance(node, ast.FunctionDef | ast.ExceptHandler)}
     known = {*made, *GIVEN, *globs, *dir(builtins)}
