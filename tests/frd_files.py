@@ -38,7 +38,7 @@ class FrdFile:
         return found
 
 
-COUNTS = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8}
+COUNTS = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8, 11: 2, 12: 3}
 
 
 def numbers(line: str) -> list[float]:

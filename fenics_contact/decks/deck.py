@@ -375,7 +375,7 @@ def _load_steps(
 
 def _print(step: int, card: Card) -> Print:
     where = card.name_of("NSET") or card.name_of("ELSET") or card.name_of("SURFACE")
-    variables = tuple(entry.upper() for row in card.rows for entry in row if entry)
-    return Print(
-        step, card.written, where, variables, card.name_of("TOTALS"), card.name_of("OUTPUT"), card.origin
-    )
+    variables = [entry.upper() for row in card.rows for entry in row if entry]
+    variables += ["SECTION FORCES"] if "SECTIONFORCES" in card.parameters else []
+    totals, output = card.name_of("TOTALS"), card.name_of("OUTPUT")
+    return Print(step, card.written, where, tuple(variables), totals, output, card.origin)

@@ -79,10 +79,11 @@ class DeckResults:
             return solid
         blocks = filter(has_type, self._blocks)
         cells = [
-            FrdCells(2, block.numbers, self.deck.nodes_of_shells(each.nodes[:, _listed(block.element)]))
+            FrdCells(dim, block.numbers, self.deck.nodes_of_shells(each.nodes[:, at]))
             if _is_layer(block)
             else each
             for block, each in zip(blocks, solid.cells, strict=True)
+            for dim, at in (block.element.given,)
         ]
         mesh = self.deck.mesh.mesh
         used = np.unique(np.concatenate([each.nodes.ravel() for each in cells]))
@@ -170,12 +171,6 @@ def has_type(block: Block) -> bool:
 def _is_layer(block: Block) -> bool:
     """Return whether elements are those that shells have become."""
     return block.element.listed < block.element.count
-
-
-def _listed(element: Element) -> list[int]:
-    """Return the nodes at the bottom of such elements, in the order of the shells."""
-    width = 3 if element.listed in (3, 6) else 4
-    return [*range(width), *range(2 * width, 3 * width)][: element.listed]
 
 
 def _plain(asked: Print) -> str:

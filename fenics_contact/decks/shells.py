@@ -363,7 +363,7 @@ class ShellPrints:
         """Return the numbers of the nodes of shells that nodes across belong to, same shape."""
         order = np.argsort(self.ends, axis=None)
         found = order[np.searchsorted(self.ends.ravel()[order], nodes)]
-        return np.asarray(self.sources[found // 3, 0])
+        return np.asarray(self.sources[found // self.ends.shape[1], 0])
 
     def summed(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Return forces on nodes of a body behind their numbers in the deck, (n, 1 + dim), of shells sums."""

@@ -38,7 +38,7 @@ class FrdCells:
     #: Number of the type by dimension and number of nodes.
     kinds: ClassVar[Mapping[tuple[int, int], int]] = {
         (3, 8): 1, (3, 6): 2, (3, 4): 3, (3, 20): 4, (3, 15): 5, (3, 10): 6,
-        (2, 3): 7, (2, 6): 8, (2, 4): 9, (2, 8): 10,
+        (2, 3): 7, (2, 6): 8, (2, 4): 9, (2, 8): 10, (1, 2): 11, (1, 3): 12,
     }  # fmt: skip
     #: Where the file has other orders than decks: nodes on upright edges come before those on top.
     orders: ClassVar[Mapping[int, Sequence[int]]] = {

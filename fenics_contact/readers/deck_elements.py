@@ -67,6 +67,11 @@ class Element:
         return len(self.written)
 
     @property
+    def given(self) -> tuple[int, Sequence[int]]:
+        """Dimension of the element that the deck has, and positions of nodes that belong to its own."""
+        return self.dim, self.written
+
+    @property
     def is_row(self) -> bool:
         """Whether it is one of a row of cells that a beam has become."""
         return False
@@ -224,6 +229,12 @@ class Layer(Element):
         variant = "" if shell.name == "S8" else "R"
         return cls(f"C3D20{variant}", "solid", "hexahedron20", 20, variant, shell.count, instead)
 
+    @property
+    def given(self) -> tuple[int, Sequence[int]]:
+        """That of shells, and the nodes at the bottom in their order."""
+        width = 3 if self.listed in (3, 6) else 4
+        return 2, [*range(width), *range(2 * width, 3 * width)][: self.listed]
+
     def side(self, label: str) -> int:
         """Return the position of the face that a label names: of both sides "SNEG" and "SPOS"."""
         return _SIDES[label] if label in _SIDES else super().side(label)
@@ -232,6 +243,11 @@ class Layer(Element):
 @dataclass(frozen=True, eq=False)
 class Row(Layer):
     """Solid cells that beams have become, whose first direction is along these."""
+
+    @property
+    def given(self) -> tuple[int, Sequence[int]]:
+        """That of beams, and a node at each end, then one in the middle."""
+        return 1, (0, 1, 8)[: self.listed]
 
     @property
     def is_row(self) -> bool:

@@ -16,6 +16,7 @@ from fenics_contact.readers.deck_assembly import read_cards
 from fenics_contact.readers.deck_cards import DeckError
 from fenics_contact.readers.deck_shells import read_solid_mesh
 from tests.fem.surfaces import grid, node_at
+from tests.frd_files import read_frd
 
 
 def text_of(
@@ -433,3 +434,18 @@ def test_beams_along_the_default_direction_need_another_one(tmp_path: Path) -> N
         DeckError, match=r"beam.inp, line \d+: .*element 1 has no length, .* by default: give"
     ):
         solved(tmp_path, text)
+
+
+def test_files_have_beams_with_their_own_nodes(tmp_path: Path) -> None:
+    """With OUTPUT=2D as CalculiX 2.20 writes them: type 12, its ends, then the node in the middle."""
+    loads = "*CLOAD\n2, 3, 100.\n*NODE FILE, OUTPUT=2D\nU, RF\n*EL FILE, SECTION FORCES\nS"
+    path, notes = tmp_path / "beam.inp", list[str]()
+    path.write_text(text_of(*ALONG_X, CLAMPED, loads))
+    run_job(path, MPI.COMM_SELF, note=notes.append)
+    found, (_, moved, _) = read_frd(path.with_suffix(".frd")), solved(tmp_path, path.read_text())
+    middle = [(12, [n, n + 2, n + 1]) for n in (4, 6, 8)]
+    assert list(found.cells.values()) == [(12, [1, 4, 3]), *middle, (12, [10, 2, 11])]
+    written = found.block("DISP").values
+    np.testing.assert_allclose([written[n] for n in moved], [*moved.values()], rtol=1e-4, atol=1e-6)
+    assert sum(found.block("FORC").at([*moved])[:, 2]) == pytest.approx(0.0, abs=1e-3)
+    assert any("SECTION FORCES not written" in each for each in notes)
