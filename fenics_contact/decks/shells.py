@@ -215,6 +215,7 @@ class _Carrier:
             )
         )
         self._note_free(number, components, free, ways)
+        self._note_oblique(number, components)
         return Rows.of(mixed @ self._local, given)
 
     def _gram(self, number: np.ndarray, components: np.ndarray) -> np.ndarray:
@@ -244,6 +245,20 @@ class _Carrier:
             f"rotations about the normals of shells at {len(set(nodes.tolist()))} nodes, first "
             f"{self.deck.mesh.numbers[nodes[0]]}, are not held: no shell resists them",
         )
+
+    def _note_oblique(self, number: np.ndarray, components: np.ndarray, least: float = 1e-3) -> None:
+        """Report given rotations about one or two axes oblique to shells; `least`: of cosines to normals."""
+        cosine = np.abs(self.motions.normal[number][:, components - 3])
+        oblique = ((cosine > least) & (cosine < 1.0 - least)).any(axis=1) & (len(components) < 3)
+        nodes = self.motions.nodes[number[oblique]]
+        given = [np.nan_to_num(each.held[nodes[:, None], components]) for each in self.steps.instants]
+        if np.abs(given).max(initial=0.0) > 1e-12:
+            target = next(t for t in self.steps.targets if np.isin(nodes, t.nodes).any())
+            self.deck.note(
+                target.card,
+                f"turns about axes oblique to shells, at node {self.deck.mesh.numbers[nodes[0]]}, are those "
+                "in their plane; CalculiX takes each as a whole turn about its axis: give all three",
+            )
 
     def _check(self) -> None:
         """Refuse what equations of small displacements, the same in all steps, cannot have."""

@@ -90,6 +90,17 @@ def test_edges_of_shells_are_named_as_in_abaqus_too(tmp_path: Path) -> None:
     np.testing.assert_array_equal(*ends)
 
 
+def test_turns_about_axes_oblique_to_a_shell_are_noted(tmp_path: Path) -> None:
+    """CalculiX's shell7rot gives two components of a turn that has three, and takes them otherwise."""
+    cosine = np.sqrt(0.5)
+    turn = np.array([[1, 0, 0], [0, cosine, -cosine], [0, cosine, cosine]])
+    for points, count in ((PLATE[0], 0), (PLATE[0] @ turn.T, 1)):
+        held = [(FIXED, "1, 6"), (FREE, "5, 5, 0.01")]
+        (tmp_path / "shell.inp").write_text(text_of(points, {"S8R": PLATE[1]}, held, ""))
+        notes = read_deck(tmp_path / "shell.inp").notes
+        assert sum("oblique to shells" in each for each in notes) == count
+
+
 @pytest.mark.parametrize(("kind", "sag"), [("S8", 2.747404e-01), ("S6", 2.757152e-01)])
 def test_other_quadratic_shells_have_the_points_of_calculix(kind: str, sag: float, tmp_path: Path) -> None:
     facets = PLATE[1] if kind == "S8" else triangles(PLATE[1], 6)
