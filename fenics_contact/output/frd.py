@@ -307,7 +307,7 @@ def nodal_fields(state: State, numbering: BodyNumbers, kinds: Sequence[str]) -> 
         moved = numbering.summed({name: state.gather_displacement(name) for name in bodies})
         found["DISP"] = in_space(moved / np.maximum(ones, 1.0))
     if {"STRESS", "TOSTRAIN", "PE"} & set(kinds):
-        found |= _on_nodes(state, numbering)
+        found |= _on_nodes(state, numbering, kinds)
     if "FORC" in kinds:
         forces = numbering.summed({name: state.gather_internal_forces(name) for name in bodies})
         found["FORC"] = in_space(forces * numbering.thickness)
@@ -318,9 +318,10 @@ def nodal_fields(state: State, numbering: BodyNumbers, kinds: Sequence[str]) -> 
     ]
 
 
-def _on_nodes(state: State, numbering: BodyNumbers) -> dict[str, np.ndarray]:
-    """Return stresses, strains and equivalent plastic strains at nodes."""
-    names = {"stress": "STRESS", "strain": "TOSTRAIN", "plastic_strain": "PE"}
+def _on_nodes(state: State, numbering: BodyNumbers, kinds: Sequence[str]) -> dict[str, np.ndarray]:
+    """Return those of stresses, strains and equivalent plastic strains at nodes that are asked for."""
+    every = {"stress": "STRESS", "strain": "TOSTRAIN", "plastic_strain": "PE"}
+    names = {name: kind for name, kind in every.items() if kind in kinds}
     parts: dict[str, dict[str, np.ndarray]] = {kind: {} for kind in names}
     counts = {}
     for name, body in state.scene.deforming.items():

@@ -59,11 +59,7 @@ class _Sections:
         )
         for card in cards:
             if card.name == "BEAMSECTION":
-                elements = mesh.elements_named(card.required("ELSET"), card)
-                if not beams[elements].all():
-                    number = card.label(mesh.element_numbers[elements[~beams[elements]][0]])
-                    raise card.error(f"element {number} is no beam: give it a *SOLID SECTION")
-                found._read(card, elements)
+                found._read(card, mesh.of_section(card, beams, "beam"))
         for place in places:
             block = mesh.blocks[place]
             lost = np.flatnonzero(np.isnan(found.size[block.first : block.first + len(block.nodes), 0]))
@@ -109,16 +105,7 @@ def _expanded(mesh: DeckMesh, places: Sequence[int], sections: _Sections) -> Dec
         first += own.size
         cells = ends[1][mine[:, _OF_CELL[:, 0]], _OF_CELL[:, 1]]
         found[place] = replace(found[place], element=Row.of(found[place].element), nodes=cells)
-    more = mesh.numbers[-1] + 1 + np.arange(len(points) + len(added) - len(mesh.points))
-    surfaces = {n: replace(each, nodes=beams.across(each.nodes)) for n, each in mesh.surfaces.items()}
-    return replace(
-        mesh,
-        numbers=np.append(mesh.numbers, more),
-        points=np.vstack([points, added]),
-        blocks=found,
-        surfaces=surfaces,
-        shells=mesh.shells.joined(beams),
-    )
+    return mesh.expanded(np.vstack([points, added]), found, beams)
 
 
 @dataclass(frozen=True, eq=False)

@@ -157,8 +157,8 @@ _TYPE = re.compile(r"(C3D|CPS|CPE|CAX)(\d+)([RIHMT]*)")
 
 
 @dataclass(frozen=True, eq=False)
-class Shell(Element):
-    """Elements of a surface, whose sides and edges are faces of the solid cell that they become."""
+class Thin(Element):
+    """Elements of a surface or a line, which become solid cells."""
 
     @property
     def dim(self) -> int:
@@ -169,6 +169,11 @@ class Shell(Element):
     def outer(self) -> int:
         """None: which side is meant must be said."""
         return 0
+
+
+@dataclass(frozen=True, eq=False)
+class Shell(Thin):
+    """Elements of a surface, whose sides and edges are faces of the solid cell that they become."""
 
     @property
     def faces(self) -> Sequence[Sequence[int]]:
@@ -182,18 +187,8 @@ class Shell(Element):
 
 
 @dataclass(frozen=True, eq=False)
-class Beam(Element):
+class Beam(Thin):
     """Elements of a line; the faces of the solid cell that they become have its nodes."""
-
-    @property
-    def dim(self) -> int:
-        """Dimension of its space."""
-        return 3
-
-    @property
-    def outer(self) -> int:
-        """None: which side is meant must be said."""
-        return 0
 
     @property
     def faces(self) -> Sequence[Sequence[int]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -100,6 +100,29 @@ class DeckMesh:
             return self.positions(np.array([_written(token)]), "element", card, row)
         return card.known("element set", plain(token), self.element_sets, row)
 
+    def of_section(self, card: Card, allowed: np.ndarray, kind: str) -> np.ndarray:
+        """Return the positions of the elements of a section, which are of a kind, a "shell" or a "beam"."""
+        elements = self.elements_named(card.required("ELSET"), card)
+        if not allowed[elements].all():
+            number = card.label(self.element_numbers[elements[~allowed[elements]][0]])
+            raise card.error(f"element {number} is no {kind}: give it a *SOLID SECTION")
+        return elements
+
+    def expanded(self, points: np.ndarray, blocks: list[Block], nodes: ShellNodes) -> DeckMesh:
+        """Return the mesh with solid cells in place of shells or beams.
+
+        `points`: all, its own first; `blocks`: all; `nodes`: which of the new ones belong to its own.
+        """
+        more = self.numbers[-1] + 1 + np.arange(len(points) - len(self.points))
+        return replace(
+            self,
+            numbers=np.append(self.numbers, more),
+            points=points,
+            blocks=blocks,
+            surfaces={n: replace(each, nodes=nodes.across(each.nodes)) for n, each in self.surfaces.items()},
+            shells=self.shells.joined(nodes),
+        )
+
     def weighed(self, token: str, card: Card, row: int | None = None) -> np.ndarray:
         """Return the positions of the cells that a load on volumes acts on, none of a set of masses."""
         alone = plain(token) in self.link_sets and plain(token) not in self.element_sets
@@ -189,12 +212,7 @@ def _written(token: str) -> int:
 
 def read_nodes(cards: Sequence[Card]) -> DeckMesh:
     """Return the nodes of cards and the sets of these alone."""
-    with_nodes = [card for card in cards if card.name == "NODE"]
-    numbers, points, numbers_of = _nodes(with_nodes)
-    mesh = DeckMesh(numbers, points, [], np.zeros(0, dtype=np.int64))
-    for card, own in zip(with_nodes, numbers_of, strict=True):
-        if card.name_of("NSET"):
-            _add(mesh, mesh.node_sets, card, card.name_of("NSET"), mesh.positions(own, "node", card))
+    mesh = _with_nodes(cards)
     for card in cards:
         if card.name == "NSET" and not card.name_of("ELSET"):
             _add(mesh, mesh.node_sets, card, card.required("NSET"), _members(mesh, card, "node"))
@@ -203,16 +221,11 @@ def read_nodes(cards: Sequence[Card]) -> DeckMesh:
 
 def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
     """Return nodes, elements, sets and surfaces of a deck."""
-    with_nodes = [card for card in cards if card.name == "NODE"]
-    numbers, points, numbers_of = _nodes(with_nodes)
-    mesh = DeckMesh(numbers, points, [], np.zeros(0, dtype=np.int64))
+    mesh = _with_nodes(cards)
     mesh.links += read_links(cards)
     mesh.link_sets |= sets_of_links(cards, mesh.links)
     cards = [card for card in cards if not is_of_links(card)]
     _elements(mesh, [card for card in cards if card.name == "ELEMENT"])
-    for card, own in zip(with_nodes, numbers_of, strict=True):
-        if card.name_of("NSET"):
-            _add(mesh, mesh.node_sets, card, card.name_of("NSET"), mesh.positions(own, "node", card))
     for card in cards:
         if card.name == "ELEMENT" and card.name_of("ELSET"):
             blocks = [block for block in mesh.blocks if block.card is card]
@@ -225,6 +238,17 @@ def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
             _add(mesh, mesh.element_sets, card, card.required("ELSET"), _members(mesh, card, "element"))
         elif card.name == "SURFACE":
             mesh.surfaces[card.required("NAME")] = _surface(mesh, card)
+    return mesh
+
+
+def _with_nodes(cards: Sequence[Card]) -> DeckMesh:
+    """Return the nodes of cards and the sets that *NODE names."""
+    with_nodes = [card for card in cards if card.name == "NODE"]
+    numbers, points, numbers_of = _nodes(with_nodes)
+    mesh = DeckMesh(numbers, points, [], np.zeros(0, dtype=np.int64))
+    for card, own in zip(with_nodes, numbers_of, strict=True):
+        if card.name_of("NSET"):
+            _add(mesh, mesh.node_sets, card, card.name_of("NSET"), mesh.positions(own, "node", card))
     return mesh
 
 

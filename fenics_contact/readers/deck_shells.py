@@ -41,17 +41,7 @@ def _expanded(mesh: DeckMesh, places: Sequence[int], depths: _Depths) -> DeckMes
         lower, upper = np.where(turned, top, low), np.where(turned, low, top)
         cells = layer_cells(lower, upper, middle[:, : CORNERS[own.shape[1]]])
         blocks[place] = replace(blocks[place], element=Layer.of(blocks[place].element), nodes=cells)
-    surfaces = {n: replace(each, nodes=shells.across(each.nodes)) for n, each in mesh.surfaces.items()}
-    return replace(
-        mesh,
-        numbers=np.append(
-            mesh.numbers, mesh.numbers[-1] + 1 + np.arange(len(points) + len(added) - len(mesh.points))
-        ),
-        points=np.vstack([points, added]),
-        blocks=blocks,
-        surfaces=surfaces,
-        shells=shells,
-    )
+    return mesh.expanded(np.vstack([points, added]), blocks, shells)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +65,7 @@ class _Depths:
                     nodes = mesh.nodes_named(entries[0], card, row)
                     by_node[nodes] = _positive(card, row, card.floats(row, 1))
             elif card.name == "SHELLSECTION":
-                elements = mesh.elements_named(card.required("ELSET"), card)
-                if not shells[elements].all():
-                    number = card.label(mesh.element_numbers[elements[~shells[elements]][0]])
-                    raise card.error(f"element {number} is no shell: give it a *SOLID SECTION")
+                elements = mesh.of_section(card, shells, "shell")
                 varies[elements] = "NODALTHICKNESS" in card.parameters
                 plies = plies_of(card)
                 given = [sum(p.thickness for p in plies)] if plies else card.floats(0) if card.lines else []

@@ -210,10 +210,11 @@ def point_fields(
     stress = _gathered(points_stress, u, body, len(points.positions))
     _put_mean_pressure(body, stress)
     plastic, parts = np.zeros(stress.shape[:2]), zip(torn.decomposition.meshes, responses, strict=False)
-    mine = [(mesh.cells, response) for mesh, response in parts if mesh.body == name]
-    _overwrite(comm, stress, [(at, end.stress) for at, end in mine if end.stress is not None])
-    found = [(at, _plastic_strain(body, at, end.history)) for at, end in mine if end.history is not None]
-    _overwrite(comm, plastic, found)
+    if any(map(has_history, body.materials)):
+        mine = [(mesh.cells, response) for mesh, response in parts if mesh.body == name]
+        _overwrite(comm, stress, [(at, end.stress) for at, end in mine if end.stress is not None])
+        found = [(at, _plastic_strain(body, at, end.history)) for at, end in mine if end.history is not None]
+        _overwrite(comm, plastic, found)
     return PointFields(points.positions, stress, points.strain(stress), plastic, body.element.cell)
 
 
