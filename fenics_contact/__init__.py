@@ -7,7 +7,7 @@ Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, HoldCurre
     ConstraintTerm, box_partition
 
 Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, SlipTable, LinearClosure, ExponentialClosure,
-    ClosureTable, ClosureLaw, FluidPressure
+    ClosureTable, ClosureLaw, FluidPressure, Wear, WearTable, WearCurve
 
 Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle,
     RigidTool, ToolMotion
@@ -132,6 +132,9 @@ if TYPE_CHECKING:
     from fenics_contact._scene.surface_laws import FrictionTable as FrictionTable
     from fenics_contact._scene.surface_laws import LinearClosure as LinearClosure
     from fenics_contact._scene.surface_laws import SlipTable as SlipTable
+    from fenics_contact._scene.wear import Wear as Wear
+    from fenics_contact._scene.wear import WearCurve as WearCurve
+    from fenics_contact._scene.wear import WearTable as WearTable
     from fenics_contact._scene_file.entry import read_scene_file as read_scene_file
     from fenics_contact.design.design import SurfaceDesign as SurfaceDesign
     from fenics_contact.design.problem import ShapeProblem as ShapeProblem

@@ -35,7 +35,7 @@ from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.contact import no_contact
 from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
 from fenics_contact.results.linear_state import DirectState, LinearState
-from fenics_contact.results.state import State, compute_energies
+from fenics_contact.results.state import State, Tolerance, compute_energies
 
 if TYPE_CHECKING:
     from fenics_contact._accuracy.state_errors import BalancedTolerance
@@ -100,8 +100,9 @@ class LinearEquilibria:
     ) -> LinearState:
         """Return the state in which facets press that lie between nodes in a master. Collective."""
 
-        def solved(torn: TornSystem, last: LinearState | None) -> LinearState:
-            return self._solved(torn, replace(previous, start=SameMeshes(last or state), known=None), wanted)
+        def solved(torn: TornSystem, last: LinearState | None, tolerance: Tolerance) -> LinearState:
+            earlier = replace(previous, start=SameMeshes(last or state), known=None)
+            return self._solved(torn, earlier, replace(wanted, tolerance=tolerance))
 
         torn, passes, inside = state.torn, Passes(solved, None), InsideFacets(state.scene.dim)
         passes.add(state)
@@ -112,7 +113,7 @@ class LinearEquilibria:
                 break
             with self._timer.phase("assemble"):
                 others = previous.before.with_slip(with_places(torn, places))
-            state = passes.run(others)
+            state = passes.run(others, wanted.tolerance)
         return state if passes.count == 1 else passes.answer(state)
 
     def _solved(self, torn: TornSystem, previous: Previous, wanted: Wanted) -> LinearState:
@@ -145,18 +146,17 @@ class LinearEquilibria:
     ) -> LinearState:
         """Compute a state that agrees with what its outer loops find. Collective."""
         wanted = solver.tolerance
-        finest = min(loop.pass_tolerance(wanted) for loop in loops)
 
-        def solve(system_of: TornSystem, last: LinearState | None) -> LinearState:
+        def solve(system_of: TornSystem, last: LinearState | None, tolerance: float) -> LinearState:
             reused = known_system(last)
             system = DualSystem(system_of, self._timer, previous=reused)
             with self._timer.phase("solve"):
                 first = (SameMeshes(last) if last else previous.start).first_guess(system)
-                solution = solve_dual(system, solver.with_tolerance(finest), first)
+                solution = solve_dual(system, solver.with_tolerance(tolerance), first)
             return self._state(system, solution, tolerance=wanted)
 
         first = previous.known if isinstance(previous.known, LinearState) else None
-        return nested(loops, solve, first, previous.last, wanted)(torn, first)
+        return nested(loops, solve, first, previous.last)(torn, first, wanted)
 
     def restored(self, stored: Stored, scene: Scene, known: State | None) -> LinearState:
         """Build a state from what `stored_state` returned, with at most one product. Collective."""

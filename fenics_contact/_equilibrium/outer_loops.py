@@ -1,4 +1,4 @@
-"""What is solved again until it agrees with the solution: fronts of fluids, friction by slip."""
+"""What is solved again until it agrees with the solution: fronts of fluids, friction by slip, wear."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class OuterLoop(Protocol):
     def require_derivatives(self, torn: TornSystem, before: State | None) -> None:
         """Reject systems, and load steps before, with which no derivatives by the shape are known."""
 
-    def pass_tolerance(self, wanted: float) -> float:
-        """Return how accurately each pass is solved."""
-
     def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
-        """Repeat solutions until both agree, from where a state left this loop. Collective."""
+        """Repeat solutions until both agree, from where the latest state left this loop. Collective.
+
+        `before`: the state at the end of the load step before.
+        """
 
     def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
         """Return the arrays from which it is restored."""
@@ -48,6 +48,10 @@ def outer_loops(scene: Scene) -> list[OuterLoop]:
         from fenics_contact._equilibrium.slip_dependence import FrictionBySlip
 
         loops.append(FrictionBySlip())
+    if any(pair.wears for pair in scene.contacts):
+        from fenics_contact._equilibrium.wearing import Wearing
+
+        loops.append(Wearing())
     return loops
 
 
@@ -56,14 +60,14 @@ def nested(
     solve: Solve,
     known: LinearState | None,
     before: State | None,
-    tolerance: float,
 ) -> Solve:
     """Return the solution of a system inside all loops."""
 
     def around(inner: Solve, loop: OuterLoop) -> Solve:
-        def solved(torn: TornSystem, last: LinearState | None) -> LinearState:
+        def solved(torn: TornSystem, last: LinearState | None, tolerance: float) -> LinearState:
             # In later passes of a loop outside, it goes on from where the pass before left it.
-            return loop.solve(Passes(inner, last), torn, before if last is known else last, tolerance)
+            latest = before if last is known else last
+            return loop.solve(Passes(inner, last, latest), torn, before, tolerance)
 
         return solved
 

@@ -4,30 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.solution import SolverStep, continued
 from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State, Tolerance
 
-#: Solves a system from the state before, if there is one.
-Solve = Callable[[TornSystem, LinearState | None], LinearState]
+#: Solves a system from the state before, if there is one, to a tolerance.
+Solve = Callable[[TornSystem, LinearState | None, Any], LinearState]
 
 
 class Passes:
-    """Passes so far, each of which starts from the last."""
+    """Passes so far, each of which starts from the last.
 
-    def __init__(self, solve: Solve, known: LinearState | None) -> None:
+    Attributes:
+        latest: The last state before them, of an earlier pass around them or of the load step before.
+    """
+
+    def __init__(self, solve: Solve, known: LinearState | None, latest: State | None = None) -> None:
         """Start from a known state."""
-        self._solve, self._products = solve, 0
+        self._solve, self._products, self.latest = solve, 0, latest
         self._state = known
         self.count = 0
         self.history: list[SolverStep] = []
 
-    def run(self, torn: TornSystem) -> LinearState:
+    def run(self, torn: TornSystem, tolerance: Tolerance) -> LinearState:
         """Return the state of a system. Collective."""
         try:
-            self._state = state = self._solve(torn, self._state)
+            self._state = state = self._solve(torn, self._state, tolerance)
         except ConvergenceError as failure:
             steps = continued(self.history, failure.history, self._products)
             raise ConvergenceError(str(failure), steps) from failure

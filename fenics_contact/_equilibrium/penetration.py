@@ -91,10 +91,6 @@ class FluidFront:
                 "derivatives by the shape need known motions where fluid enters a contact: prescribe them"
             )
 
-    def pass_tolerance(self, wanted: float) -> float:
-        """Return that of the state."""
-        return wanted
-
     def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
         """Return the state in which fluid is just where contact is open to it. Collective.
 
@@ -103,12 +99,13 @@ class FluidFront:
         """
         front = Front.of(torn)
         wet = np.zeros(torn.points.count, dtype=bool)
-        if before is not None and before.contact.wet is not None and len(before.contact.wet) == len(wet):
-            wet = before.contact.wet
+        latest = passes.latest
+        if latest is not None and latest.contact.wet is not None and len(latest.contact.wet) == len(wet):
+            wet = latest.contact.wet
         earlier: list[bytes] = []
         while wet.tobytes() not in earlier:
             earlier.append(wet.tobytes())
-            state = passes.run(front.at(torn, wet))
+            state = passes.run(front.at(torn, wet), tolerance)
             words = f"fluid pass {passes.count}: {counted(int(wet.sum()), 'point')} wet"
             safe_log(_LOG.info, "%s", words)
             passes.remark(words)

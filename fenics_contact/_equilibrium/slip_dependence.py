@@ -45,10 +45,6 @@ class FrictionBySlip:
                 "derivatives with friction by slip need one load step: give a number or a FrictionTable"
             )
 
-    def pass_tolerance(self, wanted: float) -> float:
-        """Return a smaller one: errors of passes must not pass for changes of friction."""
-        return min(wanted, max(0.1 * wanted, 1e-10))
-
     def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
         """Return the state whose friction coefficients are those of its slips. Collective.
 
@@ -58,18 +54,20 @@ class FrictionBySlip:
         smaller. Where friction falls faster with the slip than bodies are stiff, changes grow in one
         direction: θ = 1 follows them to where it falls no more. There may be several states, or none.
 
-        The tolerance is the largest change of a slip bound relative to the largest.
+        The tolerance is the largest change of a slip bound relative to the largest. That of passes is
+        smaller: their errors must not pass for changes of friction.
 
         References:
             U. Küttler, W. A. Wall, Fixed-point fluid–structure interaction solvers with dynamic relaxation,
             Comput. Mech. 43 (2008) 61–72.
         """
         slip = np.zeros((torn.points.count, torn.components - 1))
-        if before is not None and before.contact.total_slip.shape == slip.shape:
-            slip = before.contact.total_slip
+        latest = passes.latest
+        if latest is not None and latest.contact.total_slip.shape == slip.shape:
+            slip = latest.contact.total_slip
         mu, part, last = coefficients(torn, slip), 1.0, np.zeros(0)
         while passes.count < self.max_passes:
-            state = passes.run(with_coefficients(torn, mu))
+            state = passes.run(with_coefficients(torn, mu), min(tolerance, max(0.1 * tolerance, 1e-10)))
             contact = state.contact
             target = coefficients(torn, contact.total_slip)
             pressed = contact.normal_force[torn.frictional]

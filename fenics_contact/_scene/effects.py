@@ -36,6 +36,7 @@ class EffectName(StrEnum):
     CONTACT = "contact"
     CLOSURE = "surfaces that give way"
     FLUID = "fluid that enters where contact opens"
+    WEAR = "wear"
     STICK_STIFFNESS = "elastic slip"
     TRESCA = "Tresca friction"
     COULOMB = "Coulomb friction"
@@ -73,6 +74,7 @@ _REASONS = {
     EffectName.CONTACT: ("pair may touch", "pairs may touch"),
     EffectName.CLOSURE: ("pair has a law of closure", "pairs have one"),
     EffectName.FLUID: ("pair is a seal", "pairs are seals"),
+    EffectName.WEAR: ("pair loses material", "pairs lose material"),
     EffectName.STICK_STIFFNESS: ("pair has a stick stiffness", "pairs have one"),
     EffectName.TRESCA: ("pair has a fixed slip bound", "pairs have a fixed slip bound"),
     EffectName.COULOMB: (

@@ -139,6 +139,20 @@ def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[i
     return values
 
 
+def not_negative(name: str, given: float | OfPosition, points: np.ndarray) -> np.ndarray:
+    """Return a number or the values of a function at points, shape (n,), if none is negative."""
+    if not callable(given):
+        return np.full(len(points), float(given))
+    values = evaluate(name, given, points, ())
+    if (values < 0).any():
+        worst = int(np.argmin(values))
+        raise InvalidInputError(
+            f"{name} must be zero or positive everywhere, got {values[worst]:.6g} at "
+            f"({', '.join(f'{x:.6g}' for x in points[worst])}): give a function that is"
+        )
+    return values
+
+
 def gradients_of(name: str, function: OfPosition, points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Return the gradients of a function of position by central differences.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
@@ -14,7 +14,7 @@ from fenics_contact._base.late_names import warn_of_old_name
 from fenics_contact._scene.checks import check_known, check_not_negative, check_positive
 from fenics_contact._scene.choice import NO_CHOICE, Choice, Chosen
 from fenics_contact._scene.effects import EffectName
-from fenics_contact._scene.fields import OfPosition, evaluate
+from fenics_contact._scene.fields import OfPosition, not_negative
 from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidTool
 from fenics_contact._scene.part import Around, Part, require_linear, require_surface
@@ -25,6 +25,7 @@ from fenics_contact._scene.surface_laws import (
     check_closing,
     check_rising,
 )
+from fenics_contact._scene.wear import Wear
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import is_nonlinear
@@ -292,6 +293,7 @@ class ContactPair(PairPart):
             `ClosureTable` or a `ClosureLaw` of your own, for rough surfaces, coats and gaskets. None: contact
             is exact. With one, the gap of a closed point is minus its closure.
         fluid: Fluid under pressure that enters where contact opens, see `FluidPressure`; small strains only.
+        wear: Law by which the surfaces lose material as they slide, see `Wear`. None: they lose nothing.
         adjust: Slave points whose measured clearance or overlap is at most this, [length], are put in touch
             without strain, or get ``gap`` or ``interference`` if these are given; all others keep the
             measured gap. None: no point is put in touch, and ``gap`` and ``interference`` hold at all points.
@@ -321,6 +323,7 @@ class ContactPair(PairPart):
     adjust: float | None = None
     closure: ClosureLaw | None = None
     fluid: FluidPressure | None = None
+    wear: Wear | None = None
     nodes: str | None = None
     choice: Choice = field(default=NO_CHOICE, repr=False)
 
@@ -355,6 +358,7 @@ class ContactPair(PairPart):
         laws = {
             EffectName.CLOSURE: self.closure is not None,
             EffectName.FLUID: bool(self.fluids),
+            EffectName.WEAR: bool(self.wears),
             EffectName.FRICTION_CURVE: bool(law.curves or law.tables) or law.shear_limit is not None,
         }
         if self.has_friction:
@@ -368,6 +372,8 @@ class ContactPair(PairPart):
             self._require_deforming(scene)
         for fluid in self.fluids:
             fluid.check(scene, self.slave.body, self.place)
+        for wear in self.wears:
+            wear.check(scene, self.surfaces)
         if self.nodes is not None:
             self._require_touching(scene, self.nodes)
         if self._law.tables:
@@ -446,12 +452,29 @@ class ContactPair(PairPart):
         """Whether something is given of the slave's points, so that the other side cannot take its place."""
         measured = all(value == "measured" for value in self._given_gaps.values())
         varies = self.friction_varies or callable(self.shear_limit)
-        return varies or not measured or bool(self.single_nodes or self.fluids)
+        return varies or not measured or bool(self.single_nodes or self.fluids or self.wears)
 
     @property
     def fluids(self) -> tuple[FluidPressure, ...]:
         """The fluid that enters, if one does."""
         return () if self.fluid is None else (self.fluid,)
+
+    @property
+    def wears(self) -> tuple[Wear, ...]:
+        """The law of wear, if there is one."""
+        return () if self.wear is None else (self.wear,)
+
+    def repeated(self, cycles: float) -> ContactPair:
+        """Return the pair whose wear, if it has any, is that of so many cycles of a load step."""
+        return replace(self, wear=replace(*self.wears, cycles=cycles)) if self.wears else self
+
+    @property
+    def of_rows(self) -> ContactPair:
+        """The pair in all that its rows depend on: whatever fluid is in it, and however often it slides."""
+        if not (self.fluids or self.wears):
+            return self
+        wear = next((replace(each, cycles=1.0) for each in self.wears), None)
+        return replace(self, fluid=None, wear=wear)
 
     @property
     def _given_gaps(self) -> dict[str, Any]:
@@ -487,10 +510,10 @@ class ContactPair(PairPart):
         """
         given = self._given_gaps
         if "gap" in given:
-            return _not_negative(f"gap of {self.place}", given["gap"], points)
+            return not_negative(f"gap of {self.place}", given["gap"], points)
         if given.get("interference", "measured") == "measured":
             return None
-        return -_not_negative(f"interference of {self.place}", given["interference"], points)
+        return -not_negative(f"interference of {self.place}", given["interference"], points)
 
     @property
     def gives_all_gaps(self) -> bool:
@@ -544,7 +567,7 @@ class ContactPair(PairPart):
         Raises:
             InvalidInputError: If a function returns something other than numbers of at least zero.
         """
-        return _not_negative(f"friction of {self.place}", self.friction_value, points)
+        return not_negative(f"friction of {self.place}", self.friction_value, points)
 
     def limit_at(self, points: np.ndarray) -> np.ndarray:
         """Return the shear limit at points of the slave, infinite where there is none, shape (n,).
@@ -553,7 +576,7 @@ class ContactPair(PairPart):
             InvalidInputError: If a function returns something other than numbers of at least zero.
         """
         limit = np.inf if self.shear_limit is None else self.shear_limit
-        return _not_negative(f"shear limit of {self.place}", limit, points)
+        return not_negative(f"shear limit of {self.place}", limit, points)
 
 
 @in_notebooks
@@ -618,20 +641,6 @@ def _require_dimension(scene: Around, obstacle: RigidObstacle) -> None:
             f"an obstacle must lie in the space of the bodies, got a {type(obstacle).__name__} in {dim} "
             f"dimensions: give it {needed} coordinates; in the plane a RigidSphere is a round bar"
         )
-
-
-def _not_negative(name: str, given: float | OfPosition, points: np.ndarray) -> np.ndarray:
-    """Return a number or the values of a function at points, shape (n,), if none is negative."""
-    if not callable(given):
-        return np.full(len(points), float(given))
-    values = evaluate(name, given, points, ())
-    if (values < 0).any():
-        worst = int(np.argmin(values))
-        raise InvalidInputError(
-            f"{name} must be zero or positive everywhere, got {values[worst]:.6g} at "
-            f"({', '.join(f'{x:.6g}' for x in points[worst])}): give a function that is"
-        )
-    return values
 
 
 def _in_words(value: float | OfPosition | str) -> str:

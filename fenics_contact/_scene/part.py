@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -27,6 +27,14 @@ class Around(Protocol):
     @property
     def kinematics(self) -> Kinematics:
         """The kinematics of its bodies, which are all alike."""
+
+    @property
+    def supports(self) -> Sequence[Any]:
+        """What holds them."""
+
+    @property
+    def ties(self) -> Sequence[Any]:
+        """Pairs that stay together."""
 
     @property
     def deforms_much(self) -> bool:

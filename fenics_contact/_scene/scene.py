@@ -189,6 +189,8 @@ class LoadStep:
             they were.
         constraints: Values of linear constraints at the end of the step by their names; others keep theirs.
             None: all do.
+        cycles: How often the step is repeated, > 0, where pairs wear: what it loses counts so many times, see
+            `Wear`. None: pairs keep their number.
 
     Raises:
         InvalidInputError: If there are functions of time, and no time, or it is not finite.
@@ -207,6 +209,7 @@ class LoadStep:
     fluids: Mapping[str, float] | None = None
     contacts: Sequence[ContactPair] | None = None
     constraints: Mapping[str, float | Sequence[float]] | None = None
+    cycles: float | None = None
 
     def __post_init__(self) -> None:
         """Raise if loads are functions of time and no finite time is given."""
@@ -236,6 +239,9 @@ class LoadStep:
             scene = replace(scene, contacts=with_pressures(scene.contacts, given["fluids"]))
         if "constraints" in given:
             scene = replace(scene, constraints=with_values(scene.constraints, given["constraints"]))
+        if "cycles" in given:
+            repeated = tuple(pair.repeated(given["cycles"]) for pair in scene.contacts)
+            scene = replace(scene, contacts=repeated)
         return self._with(scene, given["loads"], given["supports"], given["time"])
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,7 +86,7 @@ class FrictionTable(FrictionCurve):
     def __post_init__(self) -> None:
         """Reject incomplete tables, and strengths that fall."""
         p, mu = self._values
-        _check_coefficients("FrictionTable", "pressures", p, mu)
+        require_table("FrictionTable", "pressures", p, mu)
         ends = mu[1:] + np.diff(mu) / np.diff(p) * p[1:]
         if (ends < 0).any():
             worst = int(np.argmin(ends))
@@ -142,7 +142,7 @@ class SlipTable:
     def __post_init__(self) -> None:
         """Reject incomplete tables."""
         s, mu = (np.array(each, dtype=np.float64) for each in (self.slip, self.coefficient))
-        _check_coefficients("SlipTable", "slips", s, mu)
+        require_table("SlipTable", "slips", s, mu)
 
     def at(self, slip: np.ndarray) -> np.ndarray:
         """Return the coefficients at slips, shape (n,).
@@ -162,8 +162,8 @@ class SlipTable:
         return np.asarray(np.pad(slopes, 1)[np.searchsorted(self.slip, slip, side="right")])
 
 
-def _check_coefficients(name: str, what: str, of: np.ndarray, mu: np.ndarray) -> None:
-    """Reject a table of friction coefficients whose numbers do not fit each other."""
+def require_table(name: str, what: str, of: np.ndarray, mu: np.ndarray) -> None:
+    """Reject a table of coefficients whose numbers do not fit each other."""
     if not (
         of.ndim == 1 and of.shape == mu.shape and len(of) > 1 and of[0] >= 0 and (np.diff(of) > 0).all()
         and np.isfinite(of).all() and np.isfinite(mu).all() and (mu >= 0).all()
@@ -174,7 +174,7 @@ def _check_coefficients(name: str, what: str, of: np.ndarray, mu: np.ndarray) ->
         )
 
 
-def _check_finite(name: str, p: np.ndarray, values: Sequence[np.ndarray]) -> None:
+def require_finite(name: str, p: np.ndarray, values: Sequence[np.ndarray]) -> None:
     """Reject functions that do not return a finite number for each pressure."""
     if any(each.shape != p.shape or not np.isfinite(each).all() for each in values):
         shapes = " and ".join(str(each.shape) for each in values)
@@ -191,7 +191,7 @@ def check_rising(curve: FrictionCurve, decades: int = 12) -> None:
     with user_code(f"{name} as a law of friction"):
         values = [np.asarray(each(p), dtype=np.float64) for each in (curve.strength, curve.growth)]
         largest = float(curve.largest_coefficient)
-    _check_finite(f"strength and growth of {name}", p, values)
+    require_finite(f"strength and growth of {name}", p, values)
     strength, growth = values
     wrong = np.flatnonzero((np.diff(strength) < -1e-12 * strength[1:]) | (growth[1:] < 0))
     if strength[0] != 0.0 or len(wrong):
@@ -205,6 +205,14 @@ def check_rising(curve: FrictionCurve, decades: int = 12) -> None:
             f"largest_coefficient of {name} must be at least strength / pressure everywhere, got {largest:g} "
             f"but {np.max(strength[1:] / p[1:]):g}: give the larger one"
         )
+
+
+def integral_from_zero(curve: Callable[[np.ndarray], np.ndarray], pressure: np.ndarray) -> np.ndarray:
+    """Return the integral of a curve from zero to pressures, by Gauss's quadrature, shape (n,)."""
+    places, weights = np.polynomial.legendre.leggauss(40)
+    part = 0.5 * (places + 1.0)  # squared: curves are steep near zero
+    at = [curve(np.asarray(pressure * s * s)) for s in part]
+    return np.asarray(sum(w * s * c for w, s, c in zip(weights, part, at, strict=True)) * pressure)
 
 
 class ClosureLaw(ABC):
@@ -265,10 +273,7 @@ class ClosureLaw(ABC):
         Returns:
             Shape (n,).
         """
-        places, weights = np.polynomial.legendre.leggauss(40)
-        part = 0.5 * (places + 1.0)  # squared: curves are steep near zero
-        at = [self.closure(np.asarray(pressure * s * s)) for s in part]
-        return np.asarray(sum(w * s * c for w, s, c in zip(weights, part, at, strict=True)) * pressure)
+        return integral_from_zero(self.closure, pressure)
 
 
 @dataclass(frozen=True)
@@ -433,7 +438,7 @@ def check_closing(law: ClosureLaw, decades: int = 12) -> None:
     p, name = np.logspace(-decades, decades, 40 * decades + 1), type(law).__name__
     with user_code(f"{name} as a law of closure"):
         closure, growth = (np.asarray(each(p), dtype=np.float64) for each in (law.closure, law.growth))
-    _check_finite(f"closure and growth of {name}", p, (closure, growth))
+    require_finite(f"closure and growth of {name}", p, (closure, growth))
     wrong = np.flatnonzero((np.diff(closure) < -1e-12 * np.abs(closure[1:])) | (growth[1:] < 0))
     if closure[0] < 0.0 or len(wrong) or not np.isfinite(law.reach):
         at = int(wrong[0]) + 1 if len(wrong) else 0

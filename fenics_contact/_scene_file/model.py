@@ -15,7 +15,6 @@ from fenics_contact._base.checks import meaning
 from fenics_contact._scene import automatic, loads, pairs, surface_laws
 from fenics_contact._scene import obstacles as obstacles_module
 from fenics_contact._scene.constraints import ConstraintTerm, LinearConstraint
-from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
@@ -25,6 +24,7 @@ from fenics_contact._scene.sectors import CyclicSymmetry
 from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import RigidSurface, Roller, Support, ToolMotion
 from fenics_contact._scene_file.part import Part, built, keys_of, nodes_of, not_in_files, table_of
+from fenics_contact._scene_file.surface_effects import FluidPart, WearPart, check_wear
 from fenics_contact._scene_file.values import (
     FREE,
     OF_SCALAR,
@@ -243,13 +243,6 @@ AnyFriction: TypeAlias = Annotated[Any, one_of("law", *FRICTION_LAWS)]
 AnyClosure: TypeAlias = Annotated[Any, one_of("law", *CLOSURE_LAWS)]
 
 
-@keys_of(FluidPressure)
-class FluidPart(Part):
-    """Fluid that enters a contact as far as it is open."""
-
-    enters: str = Field(description="surface of the slave's body with which the slave shares an edge")
-
-
 class _PairPart(Part):
     @classmethod
     def written(cls, made: Any) -> dict[str, Any]:
@@ -267,6 +260,7 @@ class ContactPart(_PairPart):
     friction: AnyFriction | None
     closure: AnyClosure | None
     fluid: FluidPart | None
+    wear: WearPart | None
     gap: NotNegativeField | None = Field(
         description="clearance in place of the measured one, [length]: a number, a formula in x, y, z in "
         "quotes, or a field from a file"
@@ -282,11 +276,13 @@ class ContactPart(_PairPart):
             made.master.distance(nodes_of(bodies, made.slave.body, made.slave.name))
 
     def check_values(self, made: ContactPair, key: str, bodies: Mapping[str, Body]) -> None:
-        """Evaluate friction, gap or interference, whichever the key is, at the slave's nodes."""
+        """Evaluate friction, wear, gap or interference, whichever the key is, at the slave's nodes."""
         nodes = nodes_of(bodies, made.slave.body, made.slave.name)
         if key == "friction":
             made.friction_at(nodes)
             made.limit_at(nodes)
+        elif key == "wear":
+            check_wear(made, nodes)
         elif getattr(made, key) is not None:
             made.gap_at(nodes)
 

@@ -29,7 +29,7 @@ def carried_over(before: TornSystem, multiplier: np.ndarray, after: TornSystem) 
     tau = before.numbering.gather(multiplier, before.tangential_rows.ravel()).reshape(
         -1, before.components - 1
     )
-    match = same_points(_renumbered(before, after), after.points)
+    match = same_contacts(before, after)
     matched = match >= 0
     values = np.zeros(after.points.count)
     values[matched] = normal[match[matched]]
@@ -40,6 +40,11 @@ def carried_over(before: TornSystem, multiplier: np.ndarray, after: TornSystem) 
     in_space[matched] = friction[match[matched]]
     put_contact(after, start, values, in_space)
     return start
+
+
+def same_contacts(before: TornSystem, after: TornSystem) -> np.ndarray:
+    """Return for each contact point of a system that of one before, by pair and slave node; −1 if new."""
+    return same_points(_renumbered(before, after), after.points)
 
 
 def _held_otherwise(before: TornSystem, multiplier: np.ndarray, after: TornSystem) -> np.ndarray:

@@ -139,7 +139,7 @@ class NormalRows(Relations):
     @property
     def soft(self) -> np.ndarray:
         """Marks of points that give way, shape (n_points,)."""
-        return np.zeros(self.count, dtype=bool) if self.closures is None else self.closures.curve >= 0
+        return np.zeros(self.count, dtype=bool) if self.closures is None else self.closures.soft
 
     def freedom(self, fixed: np.ndarray) -> np.ndarray:
         """Return the length of the free part of each direction, from 0 to 1, shape (n_rows,)."""

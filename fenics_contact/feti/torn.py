@@ -6,6 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -41,6 +42,9 @@ from fenics_contact.feti.ties import BondedTies, SlidingTies, TieRows
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.face import EXACT, ContactLaw
 from fenics_contact.qp.layout import ContactLayout
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.compliance import Closures
 
 
 def contact_and_tied_points(
@@ -92,6 +96,20 @@ class FluidLoad:
     pressure: np.ndarray | float = 0.0
 
 
+class Unworn:
+    """What contact takes away: nothing by default."""
+
+    #: Depth that points have lost before the load step, shape (n_contact,), [length].
+    before: np.ndarray | float = 0.0
+
+    def depth(self, pressure: np.ndarray, slip: np.ndarray) -> np.ndarray | float:
+        """Return the depth that the load step takes, shape (n_contact,), [length].
+
+        `pressure`: (n_contact,); `slip`: of the step, (n_contact, dim − 1).
+        """
+        return 0.0
+
+
 @displayed
 @dataclass(frozen=True)
 class TornSystem:
@@ -115,6 +133,7 @@ class TornSystem:
             of slip, replicated, shape (n_contact − n_friction, dim − 1), [length].
         free: The free motions of rigid surfaces and unknowns of joints, which add Q q to c.
         fluid: Load and place of fluid between surfaces.
+        wear: What contact has taken away, and takes.
     """
 
     scene: Scene
@@ -128,6 +147,7 @@ class TornSystem:
     slid: np.ndarray
     free: FreeMotions
     fluid: FluidLoad = field(default_factory=FluidLoad)
+    wear: Unworn = field(default_factory=Unworn)
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
@@ -268,6 +288,14 @@ class TornSystem:
         change[self.normal_rows] = gap - self.points.gap
         groups = self.groups.with_points(replace(self.points, gap=gap))
         return replace(self, groups=groups, right=self.right + change[self.numbering.owned])
+
+    def worn(self, wear: Unworn, closures: Closures) -> TornSystem:
+        """Return the system whose surfaces have lost material, and give way as they lose more."""
+        change = np.zeros(self.groups.total)
+        change[self.normal_rows] = wear.before
+        normal = replace(self.groups.normal, closures=closures)
+        right = self.right + change[self.numbering.owned]
+        return replace(self, groups=replace(self.groups, normal=normal), right=right, wear=wear)
 
     @property
     def components(self) -> int:
@@ -485,11 +513,8 @@ def _is_alike(scene: Scene, decomposition: Decomposition, known: TornSystem, pre
 
 
 def contacts_alike(scene: Scene, other: Scene) -> bool:
-    """Return whether two scenes have the same contact pairs, whatever fluid is in them."""
-    pairs = [
-        [c if c.fluid is None else replace(c, fluid=None) for c in each.contacts] for each in (scene, other)
-    ]
-    return pairs[0] == pairs[1]
+    """Return whether two scenes have contact pairs with the same rows, see `ContactPair.of_rows`."""
+    return [pair.of_rows for pair in scene.contacts] == [pair.of_rows for pair in other.contacts]
 
 
 def _found(

@@ -53,6 +53,11 @@ class Closures:
         """Return those of exact contact."""
         return cls(area, np.full(len(area), -1), np.ones(len(area)), ())
 
+    @property
+    def soft(self) -> npt.NDArray[np.bool_]:
+        """Marks of the contacts that give way, shape (n,)."""
+        return np.asarray(self.curve >= 0)
+
     def part(self, chosen: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> Closures:
         """Return those of some contacts."""
         return replace(self, area=self.area[chosen], curve=self.curve[chosen], scale=self.scale[chosen])
@@ -92,7 +97,7 @@ class Closures:
         Not less than zero, which it is where they belong to each other, and at most r times the difference of
         λ and the force of δ; λ r⁺ for exact contact, where δ ≤ 0.
         """
-        lost, soft = force * np.maximum(residual, 0.0), np.flatnonzero(self.curve >= 0)
+        lost, soft = force * np.maximum(residual, 0.0), np.flatnonzero(self.soft)
         if len(soft) == 0:
             return lost
         mine, force, residual = self.part(soft), force[soft], residual[soft]
@@ -117,7 +122,7 @@ class Closures:
         By Newton's method between bounds: the left side grows at least as λ does. `trial`: w; `step`: ρ.
         """
         upper = np.maximum(trial, 0.0)
-        left, right = np.flatnonzero((self.curve >= 0) & (upper > 0.0)), None
+        left, right = np.flatnonzero(self.soft & (upper > 0.0)), None
         force = upper.copy()
         low, high = np.zeros(len(left)), upper[left]
         for _ in range(most):
@@ -307,6 +312,6 @@ class Compliance(ContactLaw):
     def soft(self) -> npt.NDArray[np.bool_]:
         """Marks of the rows with a compliance, shape (size,), owned."""
         marks = np.zeros(self.layout.size, dtype=bool)
-        marks[self.layout.normal] = self.closures.curve >= 0
+        marks[self.layout.normal] = self.closures.soft
         marks[self.layout.tangential] = (self.slip > 0.0)[:, None]
         return marks

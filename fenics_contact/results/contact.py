@@ -99,6 +99,9 @@ class ContactResult:
             revolution, shape (dim,).
         wet: Whether fluid has reached a point, shape (n,); None where no fluid is. Its pressure is no part of
             the contact pressure.
+        worn: Depth that the last load step has taken away, of both surfaces together, shape (n,), [length];
+            zero where no pair wears.
+        worn_before: The same of all load steps before.
     """
 
     points: ContactPoints
@@ -113,6 +116,8 @@ class ContactResult:
     nominal_area: np.ndarray
     unbalanced: np.ndarray
     wet: np.ndarray | None = None
+    worn: np.ndarray | float = 0.0
+    worn_before: np.ndarray | float = 0.0
 
     def _facts(self) -> dict[str, Any]:
         normal = self.normal_force
@@ -177,6 +182,16 @@ class ContactResult:
     def total_slip(self) -> np.ndarray:
         """Relative tangential displacement since the undeformed state, shape (n, dim - 1), [length]."""
         return self.slip_before + self.slip
+
+    @property
+    def worn_depth(self) -> np.ndarray:
+        """Depth that has been worn off both surfaces together, shape (n,), [length]."""
+        return np.zeros(self.points.count) + self.worn_before + self.worn
+
+    def worn_volume(self, pair: int = 0) -> float:
+        """Return the volume that has been worn off both surfaces of a pair, by its number, [length³]."""
+        mine = self.on_pair(pair)
+        return float(self.nominal_area[mine] @ self.worn_depth[mine])
 
     def travel(self, direction: np.ndarray, pair: int = 0) -> float:
         """Return how far the unloaded slave may move until the pair touches, [length].

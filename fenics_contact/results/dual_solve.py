@@ -82,19 +82,24 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
         full[frictional], full[slips.frictionless] = values, others
         return full
 
-    gap = gap + torn.reach
+    normal_force = np.where(trial_normal > 0, np.maximum(normal, 0.0), 0.0)
+    slips_of_all = spread(slip, torn.sliding(displacement) - torn.slid)
+    worn = torn.wear.depth(normal_force / torn.points.area, slips_of_all)
+    gap = gap + torn.reach + worn
     origin = torn.numbering.gather(torn.right + torn.supported, torn.tangential_rows.ravel())
     return ContactResult(
         torn.points,
-        np.where(trial_normal > 0, np.maximum(normal, 0.0), 0.0),
+        normal_force,
         spread(tau),
         spread(bound),
         gap,
-        spread(slip, torn.sliding(displacement) - torn.slid),
+        slips_of_all,
         spread(origin.reshape(-1, torn.components - 1), torn.slid),
         status,
         torn.points.area,
         torn.points.area,
         torn.scene.kinematics.balanced,
         torn.fluid.wet,
+        worn,
+        torn.wear.before,
     )

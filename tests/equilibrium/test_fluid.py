@@ -188,7 +188,7 @@ def test_a_front_that_moves_forth_and_back_is_an_error_with_its_history() -> Non
     closed = replace(state.contact, normal_force=np.ones(state.contact.points.count))
     opened = replace(state.contact, normal_force=np.zeros(state.contact.points.count))
 
-    def solve(torn: Any, last: Any) -> Any:
+    def solve(torn: Any, last: Any, tolerance: Any) -> Any:
         contact = closed if torn.fluid.wet.any() else opened
         return replace(state, contact=contact)
 

@@ -106,7 +106,7 @@ def test_coefficients_that_do_not_agree_are_an_error_with_their_history() -> Non
     state: State = solved(dragged_block(Coulomb(SlipTable((0.0, 0.1), (0.4, 0.1))), 6.0))
     slips = [0.0, 0.1]
 
-    def solve(torn: Any, last: Any) -> Any:
+    def solve(torn: Any, last: Any, tolerance: Any) -> Any:
         slips.reverse()
         slip = np.full_like(state.contact.slip, slips[0])
         return replace(state, contact=replace(state.contact, slip=slip, slip_before=0.0 * slip))

@@ -72,6 +72,8 @@ from fenics_contact import (
     TransferredState,
     Tresca,
     Ufl,
+    Wear,
+    WearTable,
     goal_error,
     minimize,
     solve_scene,
@@ -151,7 +153,7 @@ FACES = ("materials", "mesh", "results", "design")
 MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
-    "ClosureLaw", "Elasticity", "EnergyModel", "FrictionCurve",
+    "ClosureLaw", "Elasticity", "EnergyModel", "FrictionCurve", "WearCurve",
     "HistoryMaterial", "Hyperelasticity", "Inexact", "Kinked", "Material",
     "NearlyIncompressible", "Objective", "MaxFunction", "Resumable", "RigidObstacle", "State", "SurfaceShape",
     "Thermoelastic", "Transverse", "Weighable",
@@ -209,7 +211,7 @@ def objects() -> dict[str, Any]:
         *CELL_TYPES.values(), ThermalStrain("block", 20.0), TotalForce("block", "z1", (0, 0, -1)),
         LinearClosure(1.0), ExponentialClosure(1.0, 0.1), ClosureTable((0.0, 0.1), (0.0, 1.0)),
         FrictionTable((0.0, 1.0), (0.3, 0.2)), FluidPressure(1.0, "x0"),
-        SlipTable((0.0, 1.0), (0.3, 0.2)),
+        SlipTable((0.0, 1.0), (0.3, 0.2)), Wear(1e-8), WearTable((0.0, 1.0), (1e-8, 2e-8)),
         Pressure("block", "z1", 1.0), Tresca(1.0), Tie(Surface("a", "z0"), Surface("b", "z1")),
         MooneyRivlin(1.0, 0.0, 9.0), Ogden((1.0,), (2.0,), 9.0), StVenantKirchhoff(1.0, 0.3),
         PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3), NeoHooke(1.0, 0.3), J2Plasticity(1.0, 0.3, 1.0),

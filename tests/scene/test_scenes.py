@@ -56,6 +56,8 @@ from fenics_contact import (
     Traction,
     Tresca,
     Ufl,
+    Wear,
+    WearTable,
     gravity,
 )
 from fenics_contact._base.checks import checked
@@ -346,7 +348,7 @@ SAMPLES: dict[type, Any] = {
         RigidTool("t", PLANE, (0, 0, 0)), ToolMotion("t"), HoldCurrent(),
         LinearClosure(1.0), ExponentialClosure(1.0, 1.0), ClosureTable((0.0, 1.0), (0.0, 1.0)),
         FrictionTable((0.0, 1.0), (0.3, 0.2)), SlipTable((0.0, 1.0), (0.3, 0.2)),
-        FluidPressure(1.0, "x0"),
+        FluidPressure(1.0, "x0"), Wear(1e-8), WearTable((0.0, 1.0), (1e-8, 2e-8)),
         Support("a", "b"), Traction("a", "b", DOWN), TotalForce("a", "b", DOWN), Pressure("a", "b", 1),
         BodyForce("a", DOWN), ThermalStrain("a", 1.0), InitialStress("a", (1.0,) * 6),
         Ufl(lambda x: x), LoadStep("a"), Scene({"a": BODY}),

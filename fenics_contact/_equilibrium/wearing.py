@@ -1,0 +1,103 @@
+"""Wear of contact surfaces: solved again until distances agree with slips, and what is lost before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact._base.display import counted
+from fenics_contact._equilibrium.passes import Passes
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.feti.carried import same_contacts
+from fenics_contact.feti.point_wear import PointWear
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
+
+
+@dataclass(frozen=True)
+class Wearing:
+    """Surfaces that lose material: passes until the distances over which they do are those of the slips."""
+
+    name = "wear"
+    max_passes: int = 100
+    rough: float = 1e-2
+
+    def require_derivatives(self, torn: TornSystem, before: State | None) -> None:
+        """Accept all: what a step takes away is part of its law, see `design.wear`."""
+
+    def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
+        """Return the state whose wear is that of its pressures and slips. Collective.
+
+        Every pass is one solution at given distances D, whose wear D r(p) is a closure. Where points slide as
+        prescribed it is the only one. Else slips change with it: the next pass takes over a part of the
+        difference, as `FrictionBySlip` does; the first one need not be accurate. The tolerance is that of the
+        forces by which the wear of the distances that were and of those that are differ, relative to all.
+        """
+        wear = PointWear.of(torn.scene, torn.points, lost(torn, before), torn.decomposition.comm)
+        slip = on_points(torn, passes.latest, "slip") * np.ones((1, torn.components - 1))
+        distance, part, last = wear.distance(slip), 1.0, np.zeros(0)
+        accuracy = max(tolerance, self.rough) if wear.by_slip else tolerance
+        while passes.count < self.max_passes:
+            state = passes.run(wear.on(torn, distance), accuracy)
+            missing = wear.distance(state.contact.slip) - distance
+            change = _in_forces(state, wear, missing)
+            passes.remark(f"wear pass {passes.count}: forces change by {change:.1e}")
+            if accuracy > tolerance:  # what slips err by changes wear by so much of its change
+                accuracy = tolerance if change * accuracy <= tolerance else max(tolerance, accuracy**2)
+                distance = distance + missing
+                continue
+            if change <= tolerance:
+                return passes.answer(state)
+            weighted = missing * state.contact.normal_force
+            if len(last):
+                turn = weighted - last
+                part *= -float(last @ turn) / (float(turn @ turn) or 1.0)
+                part = part if part > 0.0 else 1.0
+            distance, last = np.maximum(distance + part * missing, 0.0), weighted
+        after = counted(passes.count, "pass", "passes")
+        raise ConvergenceError(
+            f"wear must agree with the slips, after {after} it still changes forces by {change:.1e} of the "
+            "largest: take smaller load steps or fewer cycles, or prescribe how far surfaces slide",
+            passes.history,
+        )
+
+    def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
+        """Return what points had lost, and their distances."""
+        closures = torn.groups.normal.closures
+        return {"lost": np.asarray(torn.wear.before), "distance": getattr(closures, "distance")}
+
+    def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
+        """Return the system with the wear as it was. Collective."""
+        wear = PointWear.of(torn.scene, torn.points, stored["lost"], torn.decomposition.comm)
+        return wear.on(torn, stored["distance"])
+
+
+def lost(torn: TornSystem, before: State | None) -> np.ndarray:
+    """Return the depth that points of a system have lost in a state before, (n_contact,), [length]."""
+    return np.ravel(on_points(torn, before, "worn_depth") * np.ones((1, 1)))
+
+
+def on_points(torn: TornSystem, state: State | None, name: str) -> np.ndarray:
+    """Return a part of the result of contact at the points of a system, zero at others, (n_contact, k)."""
+    if state is None:
+        return np.zeros((torn.points.count, 1))
+    values = getattr(state.contact, name).reshape(state.contact.points.count, -1)
+    match = same_contacts(state.torn, torn)
+    found = np.zeros((torn.points.count, values.shape[1]))
+    found[match >= 0] = values[match[match >= 0]]
+    return found
+
+
+def _in_forces(state: LinearState, wear: PointWear, missing: np.ndarray) -> float:
+    """Return by how much forces change if distances do, relative to all. Collective."""
+    torn, rows = state.torn, state.rows
+    force, normal = state.contact.normal_force, torn.normal_rows
+    closures = torn.groups.normal.closures
+    assert closures is not None
+    step = torn.numbering.gather(rows.step, normal)
+    deeper = wear.depth_over(missing, force / torn.points.area)
+    change = step * deeper / (1.0 + step * closures.growth(force))
+    return float(np.linalg.norm(change)) / (rows.residuals.force_scale or 1.0)

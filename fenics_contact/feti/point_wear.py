@@ -1,0 +1,116 @@
+"""Wear at contact points: what they have lost, and how the next step's loss follows pressure and slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fenics_contact._base.fingerprint import described, require_alike
+from fenics_contact._base.libraries import MPI
+from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.wear import Wear, WearCurve
+from fenics_contact.errors import together
+from fenics_contact.feti.torn import TornSystem, Unworn
+from fenics_contact.qp.compliance import Closures
+
+
+@dataclass(frozen=True, eq=False)
+class PointWear(Unworn):
+    """Wear of the points of pairs, replicated.
+
+    `pairs`: for each law the numbers of its points; `factor`: by which distance and curve are multiplied,
+    (n_contact,); `places`: of slave nodes, (n_contact, dim).
+    """
+
+    laws: Sequence[tuple[str, Wear, np.ndarray]]
+    factor: np.ndarray
+    places: np.ndarray
+    before: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene, points: ContactPoints, before: np.ndarray, comm: MPI.Comm) -> PointWear:
+        """Return that of the contact points of a scene. Collective."""
+        laws = [
+            (pair.place, wear, np.flatnonzero(points.pair == number))
+            for number, pair in enumerate(scene.contacts)
+            for wear in pair.wears
+        ]
+        factor, places = np.zeros(points.count), scene.points[points.slave]
+        with together(comm):
+            for place, wear, mine in laws:
+                factor[mine] = wear.factor_at(place, places[mine])
+        if comm.size > 1 and any(wear.functions for _, wear, _ in laws):
+            require_alike(comm, described(factor, "wear given as functions of position"))
+        return cls(laws, factor, places, before)
+
+    @property
+    def by_slip(self) -> bool:
+        """Whether some points slide as load steps say."""
+        return any(wear.by_slip for _, wear, _ in self.laws)
+
+    def distance(self, slip: np.ndarray) -> np.ndarray:
+        """Return how far points slide, times the factor, (n_contact,); `slip`: (n_contact, dim − 1)."""
+        way, result = np.linalg.norm(slip, axis=1), np.zeros(len(self.factor))
+        for place, wear, mine in self.laws:
+            result[mine] = self.factor[mine] * wear.distance_at(place, self.places[mine], way[mine])
+        return result
+
+    def depth(self, pressure: np.ndarray, slip: np.ndarray) -> np.ndarray:
+        """Return the depth that the load step takes, see `Unworn.depth`."""
+        return self.depth_over(self.distance(slip), pressure)
+
+    def depth_over(self, distance: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+        """Return the depth that distances take that include the factor, shape (n_contact,), [length]."""
+        rate = np.zeros(len(self.factor))
+        for _, wear, mine in self.laws:
+            rate[mine] = wear.curve.rate(pressure[mine])
+        return distance * rate
+
+    def on(self, torn: TornSystem, distance: np.ndarray) -> TornSystem:
+        """Return a system that has lost what it had before, and loses more over distances."""
+        return torn.worn(self, self.closures(torn, distance))
+
+    def closures(self, torn: TornSystem, distance: np.ndarray) -> Closures:
+        """Return how far contacts give way: by their closures, and by what wears off over distances."""
+        area = torn.points.area
+        number = np.full(len(area), -1)
+        for law, (_, _, mine) in enumerate(self.laws):
+            number[mine] = law
+        given = torn.groups.normal.closures or Closures.exact(area)
+        return WornClosures(
+            area, given.curve, given.scale, given.curves, distance, number,
+            [wear.curve for _, wear, _ in self.laws],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class WornClosures(Closures):
+    """Closures of contacts that also lose material: C(λ) = s (c(λ / A) + D r(λ / A)).
+
+    `distance`: D; `law`: number of the rate r, −1 where nothing wears.
+    """
+
+    distance: np.ndarray
+    law: np.ndarray
+    rates: Sequence[WearCurve]
+
+    def part(self, chosen: np.ndarray) -> WornClosures:
+        """Return those of some contacts."""
+        values = {name: getattr(self, name)[chosen] for name in ("area", "curve", "scale", "distance", "law")}
+        return replace(self, **values)
+
+    @property
+    def soft(self) -> np.ndarray:
+        """Marks of the contacts that give way, shape (n,)."""
+        return np.asarray((self.curve >= 0) | (self.distance > 0.0))
+
+    def _of(self, member: str, force: np.ndarray) -> np.ndarray:
+        values, pressure = super()._of(member, force), np.maximum(force, 0.0) / self.area
+        name = "rate" if member == "closure" else member
+        for number, curve in enumerate(self.rates):
+            mine = (self.law == number) & (force > 0.0) & (self.distance > 0.0)
+            values[mine] += self.distance[mine] * getattr(curve, name)(pressure[mine])
+        return values
