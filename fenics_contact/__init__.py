@@ -18,7 +18,7 @@ Loads: Traction, Pressure, TotalForce, PointForce, BodyForce, gravity, centrifug
 Values of loads: SampledField, read_field, Ufl
 
 Equilibrium: solve_scene, solve_nested, solve_steps, ContactProblem, LoadSequence, AutomaticSteps,
-    TangentNewton, FixedPoint, Tolerance
+    TangentNewton, FixedPoint, Tolerance, wear_to, WearLimits
 
 To an accuracy: solve_to, solve_steps_to, minimize_to, Limits, Level, AccurateResult, AccurateDesign,
     TransferredState, quantity, goal_error, GoalError
@@ -136,6 +136,8 @@ if TYPE_CHECKING:
     from fenics_contact._scene.wear import WearCurve as WearCurve
     from fenics_contact._scene.wear import WearTable as WearTable
     from fenics_contact._scene_file.entry import read_scene_file as read_scene_file
+    from fenics_contact._wear.cycles import WearLimits as WearLimits
+    from fenics_contact._wear.cycles import wear_to as wear_to
     from fenics_contact.design.design import SurfaceDesign as SurfaceDesign
     from fenics_contact.design.problem import ShapeProblem as ShapeProblem
     from fenics_contact.mesh.body_mesh import BodyMesh as BodyMesh

@@ -303,7 +303,7 @@ def solve_steps(
         >>> states = solve_steps(scene, push, comm)  # doctest: +SKIP
         >>> states = solve_steps(ContactProblem(scene, comm, tolerance=1e-8), push)  # doctest: +SKIP
     """
-    problem = _problem_of(problem, comm)
+    problem = problem_of(problem, comm, "solve_steps")
     with together(problem.comm):
         require_steps(steps)
     sequence = LoadSequence(problem, checkpoint=checkpoint, count=len(steps))
@@ -312,17 +312,17 @@ def solve_steps(
     return states
 
 
-def _problem_of(given: ContactProblem | Scene, comm: MPI.Comm | None) -> ContactProblem:
+def problem_of(given: ContactProblem | Scene, comm: MPI.Comm | None, caller: str) -> ContactProblem:
     """Return the problem of load steps, of a scene on a communicator."""
     if not isinstance(given, Scene):
         if comm not in (None, given.comm):
             raise InvalidInputError(
-                "solve_steps of a ContactProblem is on its own communicator, got another: leave it out"
+                f"{caller} of a ContactProblem is on its own communicator, got another: leave it out"
             )
         return given
     if comm is None or not hasattr(comm, "allreduce"):
         raise InvalidInputError(
-            f"solve_steps of a scene needs a communicator, got {kind_in_words(type(comm))}: MPI.COMM_WORLD"
+            f"{caller} of a scene needs a communicator, got {kind_in_words(type(comm))}: MPI.COMM_WORLD"
         )
     return ContactProblem(given, comm)
 

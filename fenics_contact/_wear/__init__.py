@@ -1,0 +1,1 @@
+"""Wear over many cycles: jumps with their error, and shapes that follow."""

@@ -1,0 +1,96 @@
+"""A history of wear that may go on in jumps of any size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fenics_contact._equilibrium.other_rows import require_values_to_keep, with_kept
+from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._equilibrium.steps import timed
+from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact.errors import together
+from fenics_contact.feti.carried import same_contacts
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.results.state import State
+
+
+def on_points_of(torn: TornSystem, state: State, values: np.ndarray) -> np.ndarray:
+    """Return values at the contact points of a state at those of a system, zero at others, (n_contact,)."""
+    match = same_contacts(state.torn, torn)
+    return np.where(match >= 0, values[match], 0.0) if len(values) else np.zeros(torn.points.count)
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A history of wear so far.
+
+    `scene`: with its shape; `states`: the state at its end, none before the first step; `cycles`: done;
+    `volume`: lost by each pair; `steps`: solved.
+    """
+
+    problem: ContactProblem
+    scene: Scene
+    states: tuple[AnyState, ...] = ()
+    cycles: float = 0.0
+    volume: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    steps: int = 0
+
+    @property
+    def state(self) -> AnyState:
+        """The state at its end."""
+        (state,) = self.states
+        return state
+
+    @property
+    def depth(self) -> np.ndarray:
+        """Depth that points of the last state have lost, shape (n_contact,), [length]."""
+        return self.state.contact.worn_depth
+
+    @property
+    def pressure(self) -> float:
+        """The largest pressure of pairs that wear, [force / length²]."""
+        return float(self.state.contact.pressure[self._worn].max(initial=0.0))
+
+    @property
+    def slip(self) -> float:
+        """The largest slip of pairs that wear in the last load step, [length]."""
+        return float(np.linalg.norm(self.state.contact.slip[self._worn], axis=1).max(initial=0.0))
+
+    @property
+    def _worn(self) -> np.ndarray:
+        """Marks of the points of pairs that wear, shape (n_contact,)."""
+        worn = np.array([bool(pair.wears) for pair in self.scene.contacts])
+        return np.asarray(worn[self.state.contact.points.pair])
+
+    def after(self, steps: Sequence[LoadStep], cycles: float) -> Track:
+        """Return the history after so many cycles, of which the steps are one. Collective."""
+        track = self
+        for step in steps:
+            track = track._after(replace(step, cycles=cycles))
+        return replace(track, cycles=self.cycles + cycles)
+
+    def _after(self, step: LoadStep) -> Track:
+        before = next(iter(self.states), None)
+        with together(self.problem.comm):
+            scene = step.applied_to(self.scene)
+            require_values_to_keep(step, scene)
+        scene = with_kept(scene, before)
+        step = timed(step, self.steps + 1)
+        state = self.problem.solve(scene, before=before, start=before or "last", step=step)
+        contact = state.contact
+        lost = contact.nominal_area * contact.worn
+        volume = np.bincount(contact.points.pair, lost, minlength=len(scene.contacts))
+        volume = volume + (self.volume if len(self.volume) else 0.0)
+        return replace(self, scene=scene, states=(state,), volume=volume, steps=self.steps + 1)
+
+    def begun(self) -> Track:
+        """Return the history as one of no cycles yet."""
+        return replace(self, cycles=0.0)
+
+    def depth_at(self, other: Track) -> np.ndarray:
+        """Return the depths at the contact points of another history, shape (n_contact,), [length]."""
+        return on_points_of(other.state.torn, self.state, self.depth)

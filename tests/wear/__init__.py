@@ -1,0 +1,1 @@
+"""Wear over many cycles, and shapes that follow."""
