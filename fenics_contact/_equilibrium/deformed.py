@@ -50,7 +50,7 @@ from fenics_contact.qp.reductions import global_sum
 from fenics_contact.qp.solution import Solution
 from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.deformed_state import DeformedState, row_values_at
-from fenics_contact.results.dual_solve import contact_result
+from fenics_contact.results.dual_solve import contact_result, worn_by
 from fenics_contact.results.rigid_motions import UnheldMotion
 from fenics_contact.results.state import Energies, State
 
@@ -113,6 +113,8 @@ class DeformedEquilibria:
     def _solve(self, scene: Scene, previous: Previous, wanted: Wanted) -> DeformedState:
         equations, timer, before = self._equations, self._timer, previous.last
         steps = _as_accurate_as(wanted, self._steps)
+        for loop in outer_loops(scene):
+            loop.follow(equations.contact, before, steps)
         with timer.phase("assemble"):
             start = self._start(scene, previous)
         self._require_later(scene, start.time, wanted.time)
@@ -185,6 +187,8 @@ class DeformedEquilibria:
         """Build a state from what `stored_deformed` returned, with one factorisation. Collective."""
         timer, equations = self._timer, self._equations
         self._put_inside(InFacets.restored(stored, scene.dim))
+        for loop in outer_loops(scene):
+            loop.follow_stored(equations.contact, stored)
         with timer.phase("assemble"):
             load = whole = self._loading(scene, float(stored["times"][1]))
             at, load = stored_configuration(stored, load, equations.contact, self.decomposition)
@@ -202,7 +206,7 @@ class DeformedEquilibria:
 
         def slipped(contact: ContactResult) -> ContactResult:
             slip, before = stored.get("slip", (contact.slip, contact.slip_before))
-            return replace(contact, slip=slip, slip_before=before)
+            return worn_by(replace(contact, slip=slip, slip_before=before), at.contact.torn)
 
         return _state_of(path, timer, slipped, None)
 
@@ -418,7 +422,8 @@ def _state_after(path: Path, before: State | None, timer: PhaseTimer, steps: Aut
         return before.equilibrium.evaluation.contact.slip_on(points, before.contact.total_slip)
 
     def of_step(contact: ContactResult) -> ContactResult:
-        return replace(contact, **at.of_step(contact.friction_force, path.start, earlier_slip))
+        moved = replace(contact, **at.of_step(contact.friction_force, path.start, earlier_slip))
+        return worn_by(moved, at.torn)
 
     return _state_of(path, timer, of_step, steps.newton.tolerance)
 
@@ -501,6 +506,8 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     stored |= {f"history.{name}": values for name, values in history.values.items()}
     stored |= _places_of(state, state.scene.dim).stored()
     stored |= evaluation.contact.stored()
+    for loop in outer_loops(state.scene):
+        stored |= loop.stored(evaluation.contact.torn)
     if "origin" in stored:
         return stored
     return stored | {"slip": np.array([state.contact.slip, state.contact.slip_before])}

@@ -11,8 +11,8 @@ import numpy as np
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes, with_places
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
-from fenics_contact._equilibrium.outer_loops import OuterLoop, nested, outer_loops
-from fenics_contact._equilibrium.passes import Passes
+from fenics_contact._equilibrium.outer_loops import nested, outer_loops
+from fenics_contact._equilibrium.passes import OuterLoop, Passes
 from fenics_contact._equilibrium.previous import Previous, Wanted
 from fenics_contact._equilibrium.starts import (
     SameMeshes,

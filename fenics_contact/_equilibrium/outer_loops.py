@@ -2,39 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import reduce
-from typing import Protocol
 
-import numpy as np
-
-from fenics_contact._equilibrium.passes import Passes, Solve
+from fenics_contact._equilibrium.passes import OuterLoop, Passes, Solve
 from fenics_contact._scene.scene import Scene
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
-
-
-class OuterLoop(Protocol):
-    """An iteration around the dual solver; every pass of it is a solution."""
-
-    #: What its history is that of, in words.
-    name: str
-
-    def require_derivatives(self, torn: TornSystem, before: State | None) -> None:
-        """Reject systems, and load steps before, with which no derivatives by the shape are known."""
-
-    def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
-        """Repeat solutions until both agree, from where the latest state left this loop. Collective.
-
-        `before`: the state at the end of the load step before.
-        """
-
-    def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
-        """Return the arrays from which it is restored."""
-
-    def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
-        """Return a system with what was stored. Collective."""
 
 
 def outer_loops(scene: Scene) -> list[OuterLoop]:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from fenics_contact._large_deformations.load_steps import AutomaticSteps
+from fenics_contact._large_deformations.moving_contact import Contact
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.solution import SolverStep, continued
@@ -60,3 +65,38 @@ class Passes:
             products=self._products,
         )
         return replace(state, solution=found)
+
+
+class OuterLoop(ABC):
+    """An iteration around the dual solver; every pass of it is a solution."""
+
+    #: What its history is that of, in words.
+    name: str
+
+    @abstractmethod
+    def require_derivatives(self, torn: TornSystem, before: State | None) -> None:
+        """Reject systems, and load steps before, with which no derivatives by the shape are known."""
+
+    @abstractmethod
+    def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
+        """Repeat solutions until both agree, from where the latest state left this loop. Collective.
+
+        `before`: the state at the end of the load step before.
+        """
+
+    def follow(self, contact: Contact, before: State | None, steps: AutomaticSteps) -> None:
+        """Let contact of bodies that deform much begin where a state has left this loop.
+
+        `steps`: how their load is followed.
+        """
+
+    @abstractmethod
+    def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
+        """Return the arrays from which it is restored."""
+
+    @abstractmethod
+    def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
+        """Return a system with what was stored. Collective."""
+
+    def follow_stored(self, contact: Contact, stored: Mapping[str, np.ndarray]) -> None:
+        """Let contact of bodies that deform much begin where a stored state began."""

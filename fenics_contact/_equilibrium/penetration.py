@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.display import counted
-from fenics_contact._equilibrium.passes import Passes
+from fenics_contact._equilibrium.passes import OuterLoop, Passes
 from fenics_contact.errors import ConvergenceError, InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.torn import TornSystem
@@ -79,7 +79,7 @@ class Front:
         return open_ & np.isin(part, part[open_ & self.inlet])
 
 
-class FluidFront:
+class FluidFront(OuterLoop):
     """The front of fluids that enter contacts: passes until it stays where it is."""
 
     name = "fluid that enters contacts"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenics_contact._base.display import counted
-from fenics_contact._equilibrium.passes import Passes
+from fenics_contact._equilibrium.passes import OuterLoop, Passes
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.linear_state import LinearState
@@ -32,7 +32,7 @@ def with_coefficients(torn: TornSystem, coefficient: np.ndarray) -> TornSystem:
 
 
 @dataclass(frozen=True)
-class FrictionBySlip:
+class FrictionBySlip(OuterLoop):
     """Friction coefficients of pairs with a `SlipTable`: passes until they are those of the slips."""
 
     name = "friction that depends on slip"

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from fenics_contact._base.display import counted
-from fenics_contact._equilibrium.passes import Passes
-from fenics_contact.errors import ConvergenceError
+from fenics_contact._equilibrium.passes import OuterLoop, Passes
+from fenics_contact._large_deformations.load_steps import AutomaticSteps
+from fenics_contact._large_deformations.moving_contact import Contact
+from fenics_contact._large_deformations.wear import AtNodes, EarlierWear
+from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.feti.carried import same_contacts
-from fenics_contact.feti.point_wear import PointWear
+from fenics_contact.feti.point_wear import PointWear, WornClosures
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
 
 
 @dataclass(frozen=True)
-class Wearing:
+class Wearing(OuterLoop):
     """Surfaces that lose material: passes until the distances over which they do are those of the slips."""
 
     name = "wear"
@@ -64,15 +68,34 @@ class Wearing:
             passes.history,
         )
 
+    def follow(self, contact: Contact, before: State | None, steps: AutomaticSteps) -> None:
+        """Let contact begin with what a state has lost, and slide as in its load step until it knows better.
+
+        Raises:
+            InvalidInputError: If parts of load steps have histories of their own, or bodies may snap.
+        """
+        if steps.finer_history or steps.snaps:
+            raise InvalidInputError(
+                "wear is that of whole load steps, got AutomaticSteps with finer_history or snaps: leave "
+                "them out, and give more load steps"
+            )
+        contact.wear = EarlierWear.of(() if before is None else (before.contact,))
+
     def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
         """Return what points had lost, and their distances."""
-        closures = torn.groups.normal.closures
-        return {"lost": np.asarray(torn.wear.before), "distance": getattr(closures, "distance")}
+        closures = cast(WornClosures, torn.groups.normal.closures)
+        key = np.stack([torn.points.pair, torn.points.slave])
+        return {"lost": np.asarray(torn.wear.before), "lost_at": key, "distance": closures.distance}
 
     def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
         """Return the system with the wear as it was. Collective."""
         wear = PointWear.of(torn.scene, torn.points, stored["lost"], torn.decomposition.comm)
         return wear.on(torn, stored["distance"])
+
+    def follow_stored(self, contact: Contact, stored: Mapping[str, np.ndarray]) -> None:
+        """Let contact begin with what a stored state had lost before its load step."""
+        at, depth = stored["lost_at"], stored["lost"][:, None]
+        contact.wear = EarlierWear(AtNodes(at, depth), AtNodes(at, stored["slip"][0]))
 
 
 def lost(torn: TornSystem, before: State | None) -> np.ndarray:

@@ -405,11 +405,26 @@ class _LoadStepFollower:
             there = load.at_motions(now.at.motions)
             moved = self.equations.rigid_start.moved(now.at.contact.prescribed, there, now.at.displacement)
             found = self.steps.newton.solve(self.equations, load, now.at, self.timer, now.known, moved)
+            found = self._settled(load, found)
         except ConvergenceError as failure:
             return now.costing(Effort.until(failure)), failure
         if self.steps.finer_history:
             return now.costing(found.effort).ending(fraction, found, now.reached), None
         return now.costing(found.effort).reaching(fraction, found, now.since), None
+
+    def _settled(self, load: Loading, found: NonlinearEquilibrium, most: int = 50) -> NonlinearEquilibrium:
+        """Return the equilibrium in which contact has what depends on it. Collective."""
+        newton, contact = self.steps.newton, self.equations.contact
+        for _ in range(most):
+            if contact.settled(found, newton.tolerance):
+                return found
+            again = newton.solve(self.equations, load, found.evaluation.at, self.timer, found.linearisation)
+            found = replace(again, effort=found.effort.followed_by(again.effort))
+        raise ConvergenceError(
+            f"wear must agree with the slip, after {most} passes it does not: take smaller load steps or "
+            "fewer cycles, or prescribe how far surfaces slide",
+            found.effort.history,
+        )
 
     def from_near(self, now: Progress, near: Near) -> Progress:
         """Return the progress at the whole load from near its end; none where that fails. Collective."""

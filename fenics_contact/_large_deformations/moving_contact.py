@@ -370,7 +370,7 @@ class ContactConfiguration:
     def with_rows_of(self, turning: FollowerStiffness) -> TornSystem:
         """Return the system with the rows of turning forces after all others, in lengths. Collective."""
         rows = (TurningRows(*each, self.torn.decomposition.axes) for each in turning.columns)
-        return on_contact_rows(self.torn, self._at, self.prescribed, tuple(rows))
+        return on_contact_rows(self.torn, self._at, self.prescribed, tuple(rows)).giving_way_as(self.torn)
 
     @property
     def _at(self) -> ContactPoints:
@@ -403,7 +403,7 @@ class MovedContact(ContactConfiguration):
 
     def constraint_residual(self, displacement: Vector) -> Vector:
         residual = super().constraint_residual(displacement)
-        gap = self.points.points.gap - self.torn.reach
+        gap = self.points.points.gap - self.torn.reach + self.torn.wear.before
         return self._with_contact_rows(residual, gap, -self.slip(self.start))
 
     def slip(self, start: MaterialPoints) -> np.ndarray:
@@ -509,8 +509,28 @@ class MovedContact(ContactConfiguration):
         return self.points.points
 
 
+class NoEarlierWear:
+    """Contact that takes nothing away."""
+
+    def on(self, contact: MovedContact) -> MovedContact:
+        """Return contact that has lost what it had before the load step."""
+        return contact
+
+    def after(self, found: Any, tolerance: float) -> NoEarlierWear:
+        """Return what contact takes away at an equilibrium of Newton's method. Collective."""
+        return self
+
+
 class Contact:
     """Contact at the points of the undeformed bodies: small displacements."""
+
+    #: What it has taken away before the load step, and takes away in it.
+    wear = NoEarlierWear()
+
+    def settled(self, found: Any, tolerance: float) -> bool:
+        """Return whether an equilibrium has the wear of its slip; if not, contact has it now. Collective."""
+        last, self.wear = self.wear, self.wear.after(found, tolerance)
+        return self.wear is last
 
     def put_inside(self, places: InFacets) -> None:
         """Put points of pairs with obstacles inside facets of slaves, by key, all others at nodes."""
@@ -622,7 +642,7 @@ class MovingContact(Contact):
 
     def _on_rows(self, load: Loading, found: SlidingPoints, start: MaterialPoints) -> ContactConfiguration:
         torn = on_contact_rows(load.torn, found.points, load.prescribed)
-        return MovedContact(torn, load.prescribed, found, start)
+        return self.wear.on(MovedContact(torn, load.prescribed, found, start))
 
     def _coordinates(self, load: Loading, displacement: Vector) -> np.ndarray:
         """Return where all nodes of contact surfaces are, shape (n_nodes, dim), [length]. Collective."""

@@ -227,6 +227,11 @@ class Wear:
 
     def check(self, scene: Around, surfaces: Sequence[Any]) -> None:
         """Reject wear of a surface that stays where it is; `surfaces`: of the pair, the slave first."""
+        if scene.is_nonlinear and not scene.deforms_much:
+            raise InvalidInputError(
+                "wear needs linear materials or large deformations, got small ones that are nonlinear: give "
+                "FinitePlasticity, or elastic constants"
+            )
         shares = (self.share, 1.0 - self.share)
         worn = [side for side, share in zip(surfaces, shares, strict=False) if share > 0.0]
         for side in worn:

@@ -276,7 +276,7 @@ class _Pair:
         return min(self._fine.cycles * self.growth, longer)
 
     def _require_wear(self, found: WearJump, track: Track, still: float = 1e-10) -> None:
-        """Reject a cycle in which nothing slides, to rounding, `still`, relative to the size of the bodies."""
+        """Reject a cycle in which nothing slides; `still`: slip that is rounding, relative to all bodies."""
         moved = still * float(np.ptp(track.scene.points))
         if found.volume == 0.0 or (self._whole and track.slip < moved):
             raise InvalidInputError(

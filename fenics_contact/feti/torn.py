@@ -297,6 +297,11 @@ class TornSystem:
         right = self.right + change[self.numbering.owned]
         return replace(self, groups=replace(self.groups, normal=normal), right=right, wear=wear)
 
+    def giving_way_as(self, other: TornSystem) -> TornSystem:
+        """Return the system whose contacts give way as those of another one do, at the same points."""
+        normal = replace(self.groups.normal, closures=other.groups.normal.closures)
+        return replace(self, groups=replace(self.groups, normal=normal), wear=other.wear)
+
     @property
     def components(self) -> int:
         """Displacement components of a node."""

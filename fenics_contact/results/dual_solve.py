@@ -60,6 +60,12 @@ def sticking(torn: TornSystem, values: RowValues) -> np.ndarray:
     return sticks
 
 
+def worn_by(contact: ContactResult, torn: TornSystem) -> ContactResult:
+    """Return the result with the wear of its slip, which closes gaps as far as it has opened them."""
+    worn = torn.wear.depth(contact.normal_force / torn.points.area, contact.slip)
+    return replace(contact, worn=worn, gap=contact.gap - contact.worn + worn)
+
+
 def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray) -> ContactResult:
     """Gather forces, gaps and status of all contact points on every rank. Collective."""
     rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])

@@ -1,0 +1,112 @@
+"""Wear where bodies deform much: balances, small strains, checkpoints, ranks, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import (
+    AutomaticSteps,
+    Body,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    LoadStep,
+    RigidSphere,
+    Scene,
+    State,
+    Support,
+    Surface,
+    Wear,
+    solve_steps,
+)
+from fenics_contact._equilibrium.steps import stored_state
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import J2Plasticity, NeoHooke, PlaneStrain
+
+COEFFICIENT = 2e-4
+
+
+def pressed(material: Any, wear: Wear, friction: float | None, deep: float, way: float) -> Any:
+    """Return a block that is pressed on a cylinder and moved to and fro, and its load steps."""
+    body = Body(rectangle((-4.0, 0.0), (4.0, 4.0), (16, 8)), material)
+    law = None if friction is None else Coulomb(friction)
+    pair = ContactPair(Surface("punch", "y0"), RigidSphere((0.0, -50.0), 50.0), law, wear=wear)
+    scene = Scene({"punch": body}, [Support("punch", "y1", (0.0, -deep))], contacts=[pair])
+    moves = [
+        LoadStep(f"{cycles} to {x}", supports=[Support("punch", "y1", (x, -deep))], cycles=cycles)
+        for x, cycles in ((way, 1.0), (-way, 1.0), (way, 20.0))
+    ]
+    return scene, [LoadStep("press"), *moves]
+
+
+def after(scene: Scene, steps: Sequence[LoadStep]) -> tuple[State, ...]:
+    """Return the states after all steps."""
+    return solve_steps(ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9), steps)
+
+
+@pytest.mark.parametrize("friction", [None, 0.3])
+@pytest.mark.parametrize("wear", [Wear(COEFFICIENT), Wear(COEFFICIENT, sliding=0.5)])
+def test_what_is_lost_is_pressure_times_slip(wear: Wear, friction: float | None) -> None:
+    lost = 0.0
+    for state in after(*pressed(NeoHooke(2000.0, 0.3), wear, friction, 0.05, 0.3)):
+        contact, (pair,) = state.contact, state.scene.contacts
+        way = np.linalg.norm(contact.slip, axis=1) if wear.by_slip else np.full(contact.points.count, 0.5)
+        expected = COEFFICIENT * pair.wear.cycles * float(contact.normal_force @ way)
+        assert contact.nominal_area @ contact.worn == pytest.approx(expected, rel=1e-12)
+        lost += expected
+        assert contact.worn_volume() == pytest.approx(lost, rel=1e-12)
+        assert np.abs(contact.gap[contact.normal_force > 0.0]).max() < 1e-9
+
+
+def test_small_strains_wear_as_linear_materials_do() -> None:
+    ends = [
+        after(*pressed(material, Wear(COEFFICIENT), 0.3, 5e-4, 3e-3))[-1].contact
+        for material in (PlaneStrain(2000.0, 0.3), NeoHooke(2000.0, 0.3))
+    ]
+    linear, large = ends
+    np.testing.assert_allclose(large.worn_depth, linear.worn_depth, atol=2e-2 * linear.worn_depth.max())
+
+
+def test_states_that_wear_come_back_from_their_arrays() -> None:
+    scene, steps = pressed(NeoHooke(2000.0, 0.3), Wear(COEFFICIENT), 0.3, 0.05, 0.3)
+    problem = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9)
+    state = solve_steps(problem, steps[:3])[-1]
+    again = problem.restore(stored_state(state), state.scene)
+    np.testing.assert_allclose(again.contact.worn_depth, state.contact.worn_depth, rtol=1e-8)
+    np.testing.assert_allclose(again.contact.gap, state.contact.gap, atol=1e-9)
+
+
+ON_RANKS = """
+from mpi4py import MPI
+from fenics_contact import ContactProblem, Wear, solve_steps
+from fenics_contact.materials import NeoHooke
+from tests.wear.test_large_deformations import pressed
+scene, steps = pressed(NeoHooke(2000.0, 0.3), Wear(2e-4), 0.3, 0.05, 0.3)
+problem = ContactProblem(scene, MPI.COMM_WORLD, tolerance=1e-9, partitions=scene.partition(4))
+state = solve_steps(problem, steps[:3])[-1]
+if MPI.COMM_WORLD.rank == 0:
+    print(*state.contact.worn_depth)
+"""
+
+
+def test_wear_is_the_same_on_ranks(mpirun: Callable[..., str]) -> None:
+    one, two = (np.array(mpirun(ON_RANKS, ranks).split(), dtype=float) for ranks in (1, 2))
+    np.testing.assert_allclose(two, one, atol=1e-6 * one.max())
+
+
+def test_what_would_forget_its_wear_is_refused() -> None:
+    scene, steps = pressed(NeoHooke(2000.0, 0.3), Wear(COEFFICIENT), 0.3, 0.05, 0.3)
+    for options in ({"finer_history": True}, {"snaps": True}):
+        problem = ContactProblem(scene, MPI.COMM_SELF, steps=AutomaticSteps(**options))
+        with pytest.raises(InvalidInputError, match="wear is that of whole load steps"):
+            solve_steps(problem, steps)
+    body = replace(scene.bodies["punch"], material=J2Plasticity(2000.0, 0.3, 5.0))
+    with pytest.raises(InvalidInputError, match="wear needs linear materials or large deformations"):
+        replace(scene, bodies={"punch": body})
