@@ -5,17 +5,19 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenics_contact._large_deformations.load_steps import AutomaticSteps
-from fenics_contact._large_deformations.moving_contact import Contact
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.solution import SolverStep, continued
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State, Tolerance
+
+if TYPE_CHECKING:
+    from fenics_contact._large_deformations.load_steps import AutomaticSteps
+    from fenics_contact._large_deformations.moving_contact import Contact
 
 #: Solves a system from the state before, if there is one, to a tolerance.
 Solve = Callable[[TornSystem, LinearState | None, Any], LinearState]

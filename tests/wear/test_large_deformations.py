@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,38 +11,19 @@ from mpi4py import MPI
 
 from fenics_contact import (
     AutomaticSteps,
-    Body,
-    ContactPair,
     ContactProblem,
-    Coulomb,
     LoadStep,
-    RigidSphere,
     Scene,
     State,
-    Support,
-    Surface,
     Wear,
     solve_steps,
 )
 from fenics_contact._equilibrium.steps import stored_state
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import rectangle
 from fenics_contact.materials import J2Plasticity, NeoHooke, PlaneStrain
+from tests.wear.pressed import pressed
 
 COEFFICIENT = 2e-4
-
-
-def pressed(material: Any, wear: Wear, friction: float | None, deep: float, way: float) -> Any:
-    """Return a block that is pressed on a cylinder and moved to and fro, and its load steps."""
-    body = Body(rectangle((-4.0, 0.0), (4.0, 4.0), (16, 8)), material)
-    law = None if friction is None else Coulomb(friction)
-    pair = ContactPair(Surface("punch", "y0"), RigidSphere((0.0, -50.0), 50.0), law, wear=wear)
-    scene = Scene({"punch": body}, [Support("punch", "y1", (0.0, -deep))], contacts=[pair])
-    moves = [
-        LoadStep(f"{cycles} to {x}", supports=[Support("punch", "y1", (x, -deep))], cycles=cycles)
-        for x, cycles in ((way, 1.0), (-way, 1.0), (way, 20.0))
-    ]
-    return scene, [LoadStep("press"), *moves]
 
 
 def after(scene: Scene, steps: Sequence[LoadStep]) -> tuple[State, ...]:
@@ -87,7 +67,7 @@ ON_RANKS = """
 from mpi4py import MPI
 from fenics_contact import ContactProblem, Wear, solve_steps
 from fenics_contact.materials import NeoHooke
-from tests.wear.test_large_deformations import pressed
+from tests.wear.pressed import pressed
 scene, steps = pressed(NeoHooke(2000.0, 0.3), Wear(2e-4), 0.3, 0.05, 0.3)
 problem = ContactProblem(scene, MPI.COMM_WORLD, tolerance=1e-9, partitions=scene.partition(4))
 state = solve_steps(problem, steps[:3])[-1]
