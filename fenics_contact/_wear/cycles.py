@@ -38,7 +38,8 @@ class WearJump:
         depth_error: Estimated error of the depths by all jumps so far, [length].
         volume: Volume that has been worn off, [length³].
         volume_error: Its estimated error.
-        pressure: Largest pressure of the pairs that wear, [force / length²].
+        pressure: Largest pressure of the pairs that wear, a mean over the second half of the jump, [force /
+            length²].
     """
 
     cycles: float
@@ -193,8 +194,9 @@ class _Pair:
     cycles are solved one by one, in both histories alike.
     """
 
-    #: First jump, smallest jump, relative to all cycles; largest growth of a jump relative to cycles done.
-    begin, least, growth = 1e-3, 1e-9, 3.0
+    #: First jump, smallest jump, and last one, relative to all cycles: a short one, since pressures where
+    #: surfaces have just met are those of a jump and not of its end. Largest jump, relative to cycles done.
+    begin, least, end, growth = 1e-3, 1e-9, 2e-2, 3.0
 
     def __init__(
         self,
@@ -219,6 +221,7 @@ class _Pair:
         with task:
             while not reason:
                 rest = cycles - self._fine.cycles
+                rest -= self.end * cycles if rest > 1.01 * self.end * cycles else 0.0
                 jump = rest if jump > 0.75 * rest else jump
                 jump = (
                     self._singles(rest)
