@@ -60,7 +60,10 @@ FLOORS = [
     [Room("results", "states, forces, stresses, energies", "model", "4")],
     [Room("_equilibrium", "scene → state: solution, load steps, warnings", "model")],
     [Room("design", "design → mesh → adjoint → subgradient", "model", "5")],
-    [Room("_adaptive", "a quantity to an accuracy: errors, marking, meshes", "model")],
+    [
+        Room("_adaptive", "a quantity to an accuracy", "model"),
+        Room("_wear", "wear over cycles", "numbers"),
+    ],
     [
         Room("_responses", "functions", "beside"),
         Room("_scene_file", "TOML", "beside"),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.solution import SolverStep, continued
@@ -74,6 +75,9 @@ class OuterLoop(ABC):
 
     #: What its history is that of, in words.
     name: str
+
+    def check(self, last: State, scene: Scene) -> None:
+        """Reject a scene after a state that had this loop, if what it leaves would be forgotten."""
 
     @abstractmethod
     def require_derivatives(self, torn: TornSystem, before: State | None) -> None:

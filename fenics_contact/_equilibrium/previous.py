@@ -14,6 +14,7 @@ from fenics_contact._equilibrium.other_rows import (
     on_rows_of,
     with_kept,
 )
+from fenics_contact._equilibrium.outer_loops import outer_loops
 from fenics_contact._equilibrium.starts import NoStart, Start, checked_start
 from fenics_contact._equilibrium.stored import Stored
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -94,7 +95,8 @@ class AfterState:
         return self.last
 
     def check(self, scene: Scene) -> None:
-        pass
+        for loop in outer_loops(self.last.scene):
+            loop.check(self.last, scene)
 
     def kept(self, scene: Scene) -> Scene:
         return continued(with_kept(scene, self.last), kept_by_joints(self.last))

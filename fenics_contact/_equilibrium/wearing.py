@@ -13,6 +13,7 @@ from fenics_contact._equilibrium.passes import OuterLoop, Passes
 from fenics_contact._large_deformations.load_steps import AutomaticSteps
 from fenics_contact._large_deformations.moving_contact import Contact
 from fenics_contact._large_deformations.wear import AtNodes, EarlierWear
+from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.feti.carried import same_contacts
 from fenics_contact.feti.point_wear import PointWear, WornClosures
@@ -28,6 +29,17 @@ class Wearing(OuterLoop):
     name = "wear"
     max_passes: int = 100
     rough: float = 1e-2
+
+    def check(self, last: State, scene: Scene) -> None:
+        """Reject pairs that have worn and wear no more: their depth would be forgotten."""
+        now = {(pair.slave, pair.master): pair for pair in scene.contacts}
+        for number, pair in enumerate(last.scene.contacts):
+            after = now.get((pair.slave, pair.master), pair)
+            if not after.wears and last.contact.worn_volume(number) > 0.0:
+                raise InvalidInputError(
+                    f"a pair that has worn must keep its law, but {after.place} of the load step has "
+                    "none: give it Wear(..., sliding=0.0) where nothing more wears"
+                )
 
     def require_derivatives(self, torn: TornSystem, before: State | None) -> None:
         """Accept all: what a step takes away is part of its law, see `design.wear`."""

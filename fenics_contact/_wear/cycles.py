@@ -171,7 +171,9 @@ def wear_to(
     Example:
         >>> history = wear_to(scene, 1e5, MPI.COMM_WORLD)  # doctest: +SKIP
         >>> print(history)  # doctest: +SKIP
-        >>> history = wear_to(scene, 18000, comm, steps=[to, fro], first=[press])  # doctest: +SKIP
+        >>> to = LoadStep("to", supports=[Support("punch", "top", (0.02, None))])
+        >>> fro = LoadStep("fro", supports=[Support("punch", "top", (-0.02, None))])
+        >>> history = wear_to(scene, 18000, MPI.COMM_WORLD, steps=[to, fro])  # doctest: +SKIP
     """
     problem = problem_of(problem, comm, "wear_to")
     with together(problem.comm):

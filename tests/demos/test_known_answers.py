@@ -58,6 +58,10 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
         {"pitch_peak": 928.86, "unrelieved_peak": 3341.70, "finer_unrelieved_peak": 3922.45},
         {"before_after", "stress"},
     ),
+    "worn_bush": (
+        {"volume": 1.45397, "depth": 0.0926529, "new_pressure": 46.28, "life": 21877},
+        {"depth", "pressure", "stress"},
+    ),
     "orthotropic": (
         {"force": 1849.15, "half_axes": [3.20134, 2.71753], "angle": 89.153},
         {"stress", "pressure"},

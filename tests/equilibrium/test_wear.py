@@ -147,6 +147,19 @@ def test_states_that_wear_come_back_from_their_arrays() -> None:
     np.testing.assert_allclose(again.contact.worn_depth, states[-1].contact.worn_depth, rtol=1e-12)
 
 
+def test_depth_is_not_forgotten_by_steps_whose_pairs_wear_no_more() -> None:
+    scene = punch(Wear(2e-4, sliding=SLID))
+    (pair,) = scene.contacts
+    with pytest.raises(
+        InvalidInputError, match=r"a pair that has worn must keep its law, but punch y0 on rigid"
+    ):
+        worn(scene, [LoadStep("1"), LoadStep("2", contacts=[replace(pair, wear=None)])])
+    states = worn(
+        scene, [LoadStep("1"), LoadStep("2", contacts=[replace(pair, wear=Wear(1.0, sliding=0.0))])]
+    )
+    np.testing.assert_allclose(states[1].contact.worn_depth, states[0].contact.worn_depth, rtol=1e-12)
+
+
 def test_a_scene_without_wear_has_none() -> None:
     (state,) = worn(punch(None), [LoadStep("press")])
     assert not state.contact.worn_depth.any()
