@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact._base.checkpoint import Checkpoint, safe_point
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import Table, tabled
 from fenics_contact._base.progress import Task
@@ -16,6 +17,7 @@ from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import problem_of, require_steps
 from fenics_contact._scene.checks import check_positive
 from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._wear.kept import KeptInFile, NotKept
 from fenics_contact._wear.track import Track
 from fenics_contact.errors import ConvergenceError, InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
@@ -144,6 +146,7 @@ def wear_to(
     first: Sequence[LoadStep] = (),
     tolerance: float = 0.01,
     limits: WearLimits = WearLimits(),
+    checkpoint: Checkpoint | None = None,
 ) -> WearHistory:
     """Follow wear over many cycles, in jumps whose error is estimated and kept small. Collective.
 
@@ -163,6 +166,8 @@ def wear_to(
         first: Load steps that act once before the first cycle, as one that presses.
         tolerance: Largest error of depths and volumes by jumps, relative to the largest depth and the volume.
         limits: Depth, volume or pressure at which the history ends.
+        checkpoint: File that is written after each jump and from which an interrupted history goes on, also
+            to more cycles or other limits, on any number of ranks.
 
     Raises:
         InvalidInputError: If no pair wears, nothing slides in a cycle, or an argument is outside its range.
@@ -186,7 +191,11 @@ def wear_to(
             raise InvalidInputError(
                 "wear_to needs a pair that wears, got none: give ContactPair(wear=Wear(k))"
             )
-    return _Pair(problem, steps, first, tolerance, limits).to(cycles)
+    kept = NotKept()
+    if checkpoint is not None:
+        every = (*first, *steps)
+        kept = KeptInFile(checkpoint, problem, every, first=len(first), tolerance=tolerance)
+    return _Pair(problem, steps, first, tolerance, limits, kept).to(cycles)
 
 
 class _Pair:
@@ -207,37 +216,58 @@ class _Pair:
         first: Sequence[LoadStep],
         tolerance: float,
         limits: WearLimits,
+        kept: NotKept,
     ) -> None:
-        self._steps, self._tolerance, self._limits = steps, tolerance, limits
+        self._steps, self._tolerance, self._limits, self._kept = steps, tolerance, limits, kept
+        self._comm = problem.comm
+        self._whole = any(wear.by_slip for pair in problem.scene.contacts for wear in pair.wears)
+        self._singly = 1.0
+        self._next, self.jumps = 0.0, list[WearJump]()
         begun = Track(problem, problem.scene)
+        tracks, arrays = kept.recalled(begun.at_end_of((*first, *steps)))
+        if tracks:
+            self._coarse, self._fine = tracks
+            self._singly, self._next = (float(each) for each in arrays["pace"])
+            self.jumps = [WearJump(*map(float, row)) for row in arrays["jumps"]]
+            return
         for step in first:
             begun = begun.after([step], 1.0)
         self._coarse = self._fine = begun.begun()
-        self._whole = any(wear.by_slip for pair in problem.scene.contacts for wear in pair.wears)
-        self._singly = 1.0
-        self.jumps: list[WearJump] = []
 
     def to(self, cycles: float) -> WearHistory:
         """Return the history over so many cycles. Collective."""
-        task, jump, reason = Task("wear", unit="cycles"), self.begin * cycles, ""
+        task, jump = Task("wear", unit="cycles"), self._next or self.begin * cycles
+        reason = self._ended(cycles)
         with task:
             while not reason:
                 rest = cycles - self._fine.cycles
                 rest -= self.end * cycles if rest > 1.01 * self.end * cycles else 0.0
-                jump = rest if jump > 0.75 * rest else jump
-                jump = (
-                    self._singles(rest)
-                    if self._whole and jump < 2.0
-                    else self._jump(jump, self.least * cycles)
-                )
-                last = self.jumps[-1] if self.jumps else _NOTHING
-                task.step(round(last.cycles), words=f"jump {last.jump:.4g}, depth {last.depth:.4g}")
-                reason = self._limits.reached(last)
-                if not reason and last.cycles >= cycles * (1.0 - 1e-12):
-                    reason = "all cycles are done"
+                jump, done = min(jump, rest) if jump < 0.75 * rest else rest, len(self.jumps)
+                singly = self._whole and jump < 2.0
+                jump = self._singles(rest) if singly else self._jump(jump, self.least * cycles)
+                if len(self.jumps) > done:
+                    self._keep(jump)
+                    task.step(round(self._last.cycles), words=f"depth {self._last.depth:.4g}")
+                    reason = self._ended(cycles)
+                safe_point(lambda: self._kept.summary(len(self.jumps)), lambda: None, self._comm)
         fine = self._fine
         volume = 2.0 * fine.volume - self._coarse.volume
         return WearHistory(tuple(self.jumps), fine.state, *_profile(self._coarse, fine), volume, reason)
+
+    @property
+    def _last(self) -> WearJump:
+        """The last jump; before the first nothing."""
+        return self.jumps[-1] if self.jumps else _NOTHING
+
+    def _ended(self, cycles: float) -> str:
+        """Return why the history ends here, in words; empty if it goes on."""
+        done = "all cycles are done" if self._fine.cycles >= cycles * (1.0 - 1e-12) else ""
+        return self._limits.reached(self._last) or done
+
+    def _keep(self, jump: float) -> None:
+        """Write the history, with the next jump. Collective."""
+        table = np.array([astuple(each) for each in self.jumps])
+        self._kept.keep((self._coarse, self._fine), jumps=table, pace=np.array([self._singly, jump]))
 
     def _singles(self, rest: float) -> float:
         """Go on by single cycles, twice as many as the time before; return the next jump. Collective."""
@@ -267,7 +297,7 @@ class _Pair:
         except ConvergenceError as failure:
             safe_log(_LOG.info, "a jump of %g cycles is halved: %s", jump, failure)
             return 0.5 * jump
-        found, last = _described(coarse, fine, jump), self.jumps[-1] if self.jumps else _NOTHING
+        found, last = _described(coarse, fine, jump), self._last
         self._require_wear(found, fine)
         excess = found.excess(self._tolerance)
         part = self._limits.part(last, found)

@@ -29,7 +29,7 @@ class Track:
     """A history of wear so far.
 
     `scene`: with its shape; `states`: the state at its end, none before the first step; `cycles`: done;
-    `volume`: lost by each pair; `steps`: solved.
+    `volume`: lost by each pair; `steps`: solved; `jump`: cycles of the last ones.
     """
 
     problem: ContactProblem
@@ -38,6 +38,7 @@ class Track:
     cycles: float = 0.0
     volume: np.ndarray = field(default_factory=lambda: np.zeros(0))
     steps: int = 0
+    jump: float = 1.0
 
     @property
     def state(self) -> AnyState:
@@ -71,7 +72,7 @@ class Track:
         track = self
         for step in steps:
             track = track._after(replace(step, cycles=cycles))
-        return replace(track, cycles=self.cycles + cycles)
+        return replace(track, cycles=self.cycles + cycles, jump=cycles)
 
     def _after(self, step: LoadStep) -> Track:
         before = next(iter(self.states), None)
@@ -86,6 +87,13 @@ class Track:
         volume = np.bincount(contact.points.pair, lost, minlength=len(scene.contacts))
         volume = volume + (self.volume if len(self.volume) else 0.0)
         return replace(self, scene=scene, states=(state,), volume=volume, steps=self.steps + 1)
+
+    def at_end_of(self, steps: Sequence[LoadStep]) -> Track:
+        """Return the history of a scene as it is after steps, before any is solved."""
+        scene = self.scene
+        for step in steps:
+            scene = step.applied_to(scene)
+        return replace(self, scene=scene)
 
     def begun(self) -> Track:
         """Return the history as one of no cycles yet."""

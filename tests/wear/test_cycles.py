@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import ContactProblem, LoadStep, Wear, WearLimits, wear_to
+from fenics_contact import (
+    Checkpoint,
+    ContactProblem,
+    HoldCurrent,
+    LoadStep,
+    Support,
+    Wear,
+    WearLimits,
+    wear_to,
+)
 from fenics_contact._wear import cycles as of_cycles
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from tests.equilibrium.wear_cases import FORCE, fretted, punch, worn
@@ -110,3 +120,44 @@ def test_jumps_that_cannot_be_solved_are_halved(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(of_cycles._Pair, "least", 1.0)
     with pytest.raises(ConvergenceError, match="jumps of wear must be longer than"):
         wear_to(problem, 10.0)
+
+
+@pytest.mark.parametrize("by_slip", [False, True])
+def test_an_interrupted_history_goes_on_from_its_file(
+    by_slip: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, steps = fretted(Wear(2e-3), ways=(0.012, -0.012))
+    given: dict[str, Any] = {"steps": steps[1:], "first": steps[:1]}
+    cycles = 10.0
+    if not by_slip:
+        scene, given, cycles = punch(Wear(COEFFICIENT, sliding=1.0)), {}, 300.0
+    given["tolerance"] = 0.1
+    whole = wear_to(problem_of(scene), cycles, **given)
+    kept, solve, left = Checkpoint(tmp_path / "wear.npz"), ContactProblem.solve, [7]
+
+    def stopping(self: Any, *arguments: Any, **named: Any) -> Any:
+        left[0] -= 1
+        if left[0] < 0:
+            raise KeyboardInterrupt
+        return solve(self, *arguments, **named)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(ContactProblem, "solve", stopping)
+        with pytest.raises(KeyboardInterrupt):
+            wear_to(problem_of(scene), cycles, checkpoint=kept, **given)
+    again = wear_to(problem_of(scene), cycles, checkpoint=kept, **given)
+    assert len(again.jumps) == len(whole.jumps)
+    np.testing.assert_allclose(again.depth, whole.depth, atol=1e-6 * whole.depth.max())
+    done = wear_to(problem_of(scene), cycles, checkpoint=kept, **given)
+    assert done.jumps == again.jumps, "nothing is left to do"
+    longer = wear_to(problem_of(scene), 2.0 * cycles, checkpoint=kept, **given)
+    assert longer.jumps[: len(done.jumps)] == done.jumps
+    with pytest.raises(InvalidInputError, match="differs"):
+        wear_to(problem_of(scene), cycles, checkpoint=kept, **{**given, "tolerance": 0.2})
+
+
+def test_a_file_of_wear_needs_the_displacements_of_supports(tmp_path: Path) -> None:
+    scene = punch(Wear(COEFFICIENT, sliding=1.0))
+    keeping = LoadStep("hold", supports=[Support("punch", "x0", (HoldCurrent(), None))])
+    with pytest.raises(InvalidInputError, match="a checkpoint of wear needs values of all supports"):
+        wear_to(problem_of(scene), 10.0, steps=[keeping], checkpoint=Checkpoint(tmp_path / "wear.npz"))
