@@ -55,7 +55,8 @@ class Wearing(OuterLoop):
         wear = PointWear.of(torn.scene, torn.points, lost(torn, before), torn.decomposition.comm)
         slip = on_points(torn, passes.latest, "slip") * np.ones((1, torn.components - 1))
         distance, part, last = wear.distance(slip), 1.0, np.zeros(0)
-        accuracy = max(tolerance, self.rough) if wear.by_slip else tolerance
+        guessed = passes.latest is not None or not wear.by_slip
+        accuracy = tolerance if guessed else max(tolerance, self.rough)
         while passes.count < self.max_passes:
             state = passes.run(wear.on(torn, distance), accuracy)
             missing = wear.distance(state.contact.slip) - distance
