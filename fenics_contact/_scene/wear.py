@@ -11,7 +11,7 @@ import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.checks import check_not_negative, check_positive
-from fenics_contact._scene.fields import OfPosition, not_negative
+from fenics_contact._scene.fields import OfPosition, gradients_of, not_negative
 from fenics_contact._scene.surface_laws import integral_from_zero, require_finite, require_table
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
@@ -277,3 +277,19 @@ class Wear:
         """Return the distance of a cycle at points, whose slip has these lengths, shape (n,), [length]."""
         given: Any = self.sliding
         return self.counted(slip if self.by_slip else not_negative(f"sliding of {place}", given, points))
+
+    def grows_at(self, distance: np.ndarray) -> np.ndarray:
+        """Return marks of distances of which more would count, shape (n,)."""
+        return np.asarray(distance > self.least_slip)
+
+    def by_place(self, place: str, points: np.ndarray, slip: np.ndarray) -> np.ndarray:
+        """Return the gradient of factor times distance by the points, as `distance_at`, shape (n, dim)."""
+        factor, distance = self.factor_at(place, points), self.distance_at(place, points, slip)
+        growing = factor * (distance > 0.0)
+        parts = (self.coefficient, distance * self.cycles / self.hardness), (self.sliding, growing)
+        slopes = [
+            share[:, None] * gradients_of(f"wear of {place}", given, points, ())
+            for given, share in parts
+            if callable(given) and given in self.functions
+        ]
+        return np.asarray(sum(slopes, np.zeros(points.shape)))

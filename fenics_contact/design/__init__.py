@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from fenics_contact.design.peak_pressure import PeakPressure
     from fenics_contact.design.remeshed import Remeshed
     from fenics_contact.design.several import LoadCases, LoadPath
+    from fenics_contact.design.wear import LargestWornDepth, WearNonuniformity, WornDepthNorm, WornVolume
 
 __all__ = [
     "AdaptiveTolerance",
@@ -47,6 +48,7 @@ __all__ = [
     "Kinked",
     "LargestPressure",
     "LargestStress",
+    "LargestWornDepth",
     "LinearConstraints",
     "LoadCases",
     "LoadPath",
@@ -69,7 +71,10 @@ __all__ = [
     "TotalPotential",
     "VolumeIntegral",
     "WeakChoice",
+    "WearNonuniformity",
     "Weighable",
+    "WornDepthNorm",
+    "WornVolume",
     "convex",
     "fixed_rim",
     "monotone",

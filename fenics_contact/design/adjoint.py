@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -17,6 +18,7 @@ from fenics_contact._scene.plan import MOTION_ROUNDING
 from fenics_contact._surfaces.facets import edge_distance
 from fenics_contact.design.objective import Partials
 from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.feti.averages import nodal_mean_transposed
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.cones import FeasibleSet
@@ -413,22 +415,36 @@ def require_from_rest(state: State) -> None:
         )
 
 
-def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Partials:
-    """Return the derivatives of a step's objective with what all later steps add. Collective.
+def on_owned(torn: TornSystem, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values in some rows of B, replicated, as an owned vector that is zero in all other rows."""
+    result, position = np.zeros(len(torn.numbering.owned)), torn.numbering.owned_index(rows)
+    result[position[position >= 0]] = values[position >= 0]
+    return result
 
-    `by_position`: derivative of the objectives of all later steps by the relative tangential displacement
-    after this step, owned, zero in all other rows.
+
+def with_slips(state: State, own: Partials, by_slip: np.ndarray) -> Partials:
+    """Return the derivatives of an objective that depends on the slips of points, too. Collective.
+
+    `by_slip`: derivative by the slips of all points in their tangents, replicated, shape (n_points, dim − 1).
+    They are without the elastic slip of the step.
     """
-    columns, compliance = state.torn.free.columns, state.torn.compliance.contact
-    # The origin is without the elastic slip of this step.
-    by_area = own.by_area - slips_by_area(state.torn, state.solution.multiplier, by_position)
-    moved = -np.asarray(state.torn.decomposition.comm.allreduce(columns.T @ by_position))
+    torn, alone = state.torn, state.torn.groups.slips.frictionless
+    columns, compliance = torn.free.columns, torn.compliance.contact
+    rows = on_owned(torn, torn.tangential_rows.ravel(), by_slip[torn.frictional].ravel())
+    moved = -np.asarray(torn.decomposition.comm.allreduce(columns.T @ rows))
+    by_displacement = own.by_displacement + torn.force(rows)
+    if np.any(by_slip[alone]):  # these have no rows
+        jump = torn.points.jump[alone]
+        forces = np.einsum("na,nad->nd", by_slip[alone], torn.points.tangents[alone])
+        nodes = np.unique(jump.indices)
+        by_displacement += nodal_mean_transposed(torn.decomposition, nodes, jump[:, nodes].T @ forces)
     return replace(
         own,
-        by_displacement=own.by_displacement + state.torn.force(by_position),
-        by_multiplier=own.by_multiplier - compliance.sprung(by_position),
-        by_area=by_area,
-        by_jump=own.by_jump + by_position,
+        by_displacement=by_displacement,
+        by_multiplier=own.by_multiplier - compliance.sprung(rows),
+        by_area=own.by_area - slips_by_area(torn, state.solution.multiplier, rows),
+        by_jump=own.by_jump + rows,
+        by_sliding=own.by_sliding + by_slip[alone],
         by_motion=own.by_motion + moved,
     )
 
@@ -444,15 +460,66 @@ def slips_by_area(torn: TornSystem, multiplier: np.ndarray, weight: np.ndarray) 
     return result
 
 
-def by_slip_origin(state: State, own: Partials, adjoint_multiplier: np.ndarray) -> np.ndarray:
-    """Return the derivative by the positions from which a step's slip is measured, owned, (n_owned,).
+class Coupling(ABC):
+    """A part of the contact law that the solver of a state holds, and that follows what it finds.
 
-    The slip B u − c enters the contact law with the adjoint's multiplier ζ and the step's own objective; the
-    origin is c: the derivative is ζ − ∂J/∂(B u − c) in tangential rows.
+    The adjoint at held parts gives derivatives of the objective by them. The parts depend on slips, and so
+    does the objective in turn, by the derivatives times slopes y: `read` returns y, `following` adds what it
+    means.
     """
-    torn = state.torn
-    tangential = torn.groups.marks([torn.groups.slips])[torn.numbering.owned]
-    return np.where(tangential, adjoint_multiplier - own.by_jump, 0.0)
+
+    def begun(self, partials: Partials) -> Partials:
+        """Return the derivatives with those through what the part makes of forces and areas. Collective."""
+        return partials
+
+    @abstractmethod
+    def read(self, partials: Partials, adjoint: Adjoint) -> np.ndarray:
+        """Return y of the points whose part changes with the slip, replicated. Collective."""
+
+    @abstractmethod
+    def following(self, partials: Partials, y: np.ndarray) -> Partials:
+        """Return the derivatives with what y adds, along the slips. Collective."""
+
+    def ended(self, partials: Partials, adjoint: Adjoint) -> Partials:
+        """Return the derivatives with those by the places of nodes. Collective."""
+        return partials
+
+
+@dataclass(frozen=True, eq=False)
+class LaterSteps:
+    """How the objectives of all later steps depend on what a step leaves behind: not at all by default.
+
+    `by_position`: derivative by the relative tangential displacements after the step, replicated, (n_points,
+    dim − 1); `by_worn`: by the depth that has been worn off, replicated, (n_points,).
+    """
+
+    by_position: np.ndarray
+    by_worn: np.ndarray
+
+    @classmethod
+    def none(cls, state: State) -> LaterSteps:
+        """Return those of the last step."""
+        return cls(
+            np.zeros((state.torn.points.count, state.torn.components - 1)), np.zeros(state.torn.points.count)
+        )
+
+    def added(self, state: State, own: Partials) -> Partials:
+        """Return the derivatives of a step's objective with what all later steps add. Collective."""
+        return with_slips(state, replace(own, by_worn=own.by_worn + self.by_worn), self.by_position)
+
+    def before(self, state: State, whole: Partials, adjoint_multiplier: np.ndarray) -> LaterSteps:
+        """Return what a step, of which these are the later ones, adds to the step before. Collective.
+
+        `whole`: derivatives of this step with those of later ones. The slip B u − c enters the contact law
+        with the adjoint's multiplier ζ, and objectives, but later ones depend on B u alone: the derivative by
+        c is ζ − ∂J/∂(B u − c), and so is the one by gaps. Depth that was lost is part of all later depths.
+        """
+        torn, by_origin = state.torn, self.by_position.copy()
+        by_right = adjoint_multiplier - whole.by_jump
+        rows = torn.gathered(by_right, torn.groups.slips)
+        by_origin[torn.frictional] += rows.reshape(-1, torn.components - 1)
+        by_origin[torn.groups.slips.frictionless] -= whole.by_sliding
+        return LaterSteps(by_origin, torn.gathered(by_right, torn.groups.normal) + whole.by_worn)
 
 
 @dataclass(frozen=True)

@@ -103,11 +103,13 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
 class PairedFields:
     """State and adjoint as derivatives by the geometry combine them: multipliers of one, motion of the other.
 
-    `multipliers`: λ and ζ − ∂J/∂(B u − c), owned; `displacements`: w and u, torn displacements of this rank.
+    `multipliers`: λ and ζ − ∂J/∂(B u − c), owned; `displacements`: w and u, torn displacements of this rank;
+    `sliding`: ∂J/∂s of points without friction, replicated.
     """
 
     multipliers: tuple[np.ndarray, np.ndarray]
     displacements: tuple[np.ndarray, np.ndarray]
+    sliding: np.ndarray | float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -370,6 +372,7 @@ def _row_fields(torn: TornSystem, fields: PairedFields) -> RowFields:
     for k, x in enumerate(fields.multipliers):
         gathered = torn.numbering.gather(x, torn.tangential_rows.ravel())
         friction[k, torn.frictional] = gathered.reshape(-1, width)
+    friction[1, torn.groups.slips.frictionless] = -np.asarray(fields.sliding)
     motions = point_motions(torn, points, torn.scene.contacts, fields)
     return RowFields(motions.nodes, motions.values, motions.relative, normal, friction)
 

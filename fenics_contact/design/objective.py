@@ -34,6 +34,10 @@ class Partials:
         by_area: ∂J/∂A by the areas of the contact points, replicated, shape (n_points,), or zero.
         by_jump: ∂J/∂(B u − c), owned, shape (n_owned,), or zero: it serves the derivative by the shape, what
             it means for u is part of ``by_displacement``.
+        by_sliding: The same by slips of the contact points without friction, which have no rows, replicated,
+            shape (n_frictionless, dim − 1), or zero.
+        by_worn: ∂J/∂w by the depth that has been worn off contact points, replicated, shape (n_points,), or
+            zero; what it means for u, λ and X is no part of the others.
     """
 
     value: float
@@ -43,6 +47,8 @@ class Partials:
     by_motion: np.ndarray | float = 0.0
     by_area: np.ndarray | float = 0.0
     by_jump: np.ndarray | float = 0.0
+    by_sliding: np.ndarray | float = 0.0
+    by_worn: np.ndarray | float = 0.0
 
     @classmethod
     def of(cls, state: State, value: float, **known: Any) -> Partials:
@@ -113,6 +119,7 @@ def finite_partials(partials: Partials) -> Partials:
     finite("derivative by contact forces", partials.by_multiplier)
     finite("derivative by areas", np.asarray(partials.by_area))
     finite("derivative by slips and gaps", np.asarray(partials.by_jump))
+    finite("derivative by worn depths", np.asarray(partials.by_worn))
     return partials
 
 

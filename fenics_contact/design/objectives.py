@@ -17,6 +17,7 @@ from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface
+from fenics_contact.design.adjoint import on_owned
 from fenics_contact.design.forms import Density, ShapeForms
 from fenics_contact.design.load_derivatives import strain_work_by_shape, work_by_shape
 from fenics_contact.design.motion import BodyIntegral, require_body
@@ -87,7 +88,7 @@ def on_rows(state: State, normal: np.ndarray, tangential: np.ndarray) -> np.ndar
 
 def on_normal_rows(state: State, values: np.ndarray) -> np.ndarray:
     """Return values in the owned normal rows, zero in all others, shape (n_owned,)."""
-    return _on(state, state.torn.normal_rows, values)
+    return on_owned(state.torn, state.torn.normal_rows, values)
 
 
 def on_tangential_rows(state: State, values: np.ndarray) -> np.ndarray:
@@ -96,14 +97,7 @@ def on_tangential_rows(state: State, values: np.ndarray) -> np.ndarray:
     Those of points without friction, which have no such rows, are left out.
     """
     torn = state.torn
-    return _on(state, torn.tangential_rows.ravel(), values[torn.frictional].ravel())
-
-
-def _on(state: State, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-    result = np.zeros(len(state.torn.numbering.owned))
-    position = state.torn.numbering.owned_index(rows)
-    result[position[position >= 0]] = values[position >= 0]
-    return result
+    return on_owned(torn, torn.tangential_rows.ravel(), values[torn.frictional].ravel())
 
 
 def _finite(value: float, *derivatives: np.ndarray) -> tuple[Any, ...]:

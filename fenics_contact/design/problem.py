@@ -107,6 +107,7 @@ def _check_differentiable(scene: Scene) -> None:
         reasons |= {
             "materials without history": any(map(has_history, materials)),
             "materials without mean_dilatation": any(map(has_mean_dilatation, materials)),
+            "pairs of nonlinear bodies without wear": any(pair.wears for pair in scene.contacts),
             "pressures that do not follow their surfaces": bool(scene.following_pressures),
             "nonlinear bodies without ThermalStrain": any(load.temperatures for load in scene.loads),
         }
@@ -380,7 +381,12 @@ class ShapeProblem(SingleProblem):
         """
         if partials is None:
             require_from_rest(state)
-        return self._point_at(np.zeros(self.size), state, self._tightest, None, partials)
+            partials = self.partials_of(self.objective, state)
+        return self.differentiated(state, partials)[0]
+
+    def differentiated(self, state: AnyState, partials: Partials) -> tuple[DesignPoint, Partials]:
+        """Return the same, and the derivatives by the state with those of all it depends on. Collective."""
+        return self._adjoint_at(np.zeros(self.size), state, self._tightest, self._adjoint_start, partials)
 
     def partials_of(self, objective: Objective, state: AnyState) -> Partials:
         """Return an objective and its partial derivatives at a state, checked. Collective."""
@@ -461,22 +467,22 @@ class ShapeProblem(SingleProblem):
         self._adjoint_start = self._adjoint_start.at(state.torn)
 
     def _point_at(
-        self,
-        alpha: np.ndarray,
-        state: AnyState,
-        tolerance: float,
-        known: DesignPoint | None,
-        partials: Partials | None = None,
+        self, alpha: np.ndarray, state: AnyState, tolerance: float, known: DesignPoint | None
     ) -> DesignPoint:
         """Return objective, subgradient and their errors at a state. Collective."""
+        start, partials = self._adjoint_start, self.partials_of(self.objective, state)
+        if known is not None:
+            start = known.state.adjoint_start(known.adjoint_multiplier)
+        return self._adjoint_at(alpha, state, tolerance, start, partials)[0]
+
+    def _adjoint_at(
+        self, alpha: np.ndarray, state: AnyState, tolerance: float, start: NoAdjointStart, partials: Partials
+    ) -> tuple[DesignPoint, Partials]:
+        """Return the point of an objective with these derivatives, and all its derivatives. Collective."""
         before = state.products
-        if partials is None:
-            partials = self.partials_of(self.objective, state)
         with one_thread(self.comm), self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
-            start, accuracy = self._adjoint_start, adjoint_tolerance(tolerance, linearised.weak)
-            if known is not None:
-                start = known.state.adjoint_start(known.adjoint_multiplier)
+            accuracy = adjoint_tolerance(tolerance, linearised.weak)
             adjoint, error, partials = adjoint_of(
                 state, partials, linearised, accuracy, start.at(state.torn).direction()
             )
@@ -491,11 +497,12 @@ class ShapeProblem(SingleProblem):
         value, gradient, error = self.comm.bcast((value, gradient, error))
         finite("gradient", gradient)
         safe_log(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, before + spent)
-        return DesignPoint(
+        point = DesignPoint(
             alpha=np.array(alpha, dtype=float), value=value, gradient=gradient, state=state,
             weak=linearised.weak, adjoint_iterations=spent, tolerance=tolerance,
             correction=error.correction, error=error.size, adjoint_multiplier=adjoint.multiplier,
         )  # fmt: skip
+        return point, partials
 
     @collectively("ShapeProblem.case", comm_of)
     def case(self, scene: Scene, objective: Objective | None = None) -> ShapeProblem:

@@ -17,7 +17,6 @@ from fenics_contact.design.adjoint import (
     NoAdjointError,
     StateError,
     growth_of,
-    solve_adjoint,
     state_error,
 )
 from fenics_contact.design.contact_derivatives import (
@@ -30,6 +29,7 @@ from fenics_contact.design.contact_derivatives import (
     contact_by_shape,
     ties_by_shape,
 )
+from fenics_contact.design.couplings import solve_coupled
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.load_derivatives import work_by_shape
 from fenics_contact.design.objective import Partials
@@ -184,14 +184,7 @@ def adjoint_of(
         shares = np.array([state.torn.numbering.comm.allreduce(float(unbalanced))])
         return adjoint, state_error(state, partials, linearised, adjoint, shares), partials
     linear = as_linear(state, "the adjoint and its error")
-    if all(pair.slip_table is None for pair in state.scene.contacts):
-        adjoint = solve_adjoint(linear, partials, linearised, tolerance=tolerance, start=start)
-    else:
-        from fenics_contact.design.slip_friction import solve_following_slip
-
-        adjoint, partials = solve_following_slip(
-            linear, partials, linearised, tolerance=tolerance, start=start
-        )
+    adjoint, partials = solve_coupled(linear, partials, linearised, tolerance=tolerance, start=start)
     shares = adjoint.motions * linear.dual.problem.coarse.residual(linear.solution.multiplier)
     return adjoint, state_error(state, partials, linearised, adjoint, shares), partials
 
@@ -202,7 +195,8 @@ def by_nodes(
     """Sum the objective's own derivative, −wᵀ δ(f_int − f) and the share of contacts and ties. Collective."""
     torn, u, w = state.torn, state.torn_displacement, adjoint.displacement
     work = work_by_shape(forms, torn, u, w)
-    fields = PairedFields((state.solution.multiplier, adjoint.multiplier - partials.by_jump), (w, u))
+    multipliers = state.solution.multiplier, adjoint.multiplier - partials.by_jump
+    fields = PairedFields(multipliers, (w, u), partials.by_sliding)
     by_bound = bound_sensitivity(state.torn, partials.by_multiplier, w, linearised)
     by_area = partials.by_area + closures_by_area(torn, state.solution.multiplier, adjoint.multiplier)
     if isinstance(state, DeformedState):

@@ -13,7 +13,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.fingerprint import described
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact.design.adjoint import WeakPoints, by_slip_origin, with_later_steps
+from fenics_contact.design.adjoint import LaterSteps, WeakPoints
 from fenics_contact.design.base import DesignProblem, comm_of, with_fewest_weak_points
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.memory import DesignPoint, JointPoint, record_of_values
@@ -390,7 +390,7 @@ class LoadPath(JointProblem):
         """Solve the adjoints from the last step to the first. Collective."""
         states = self._states.of(alpha)
         found: dict[str, DesignPoint] = {}
-        by_position = np.zeros(0)
+        later = LaterSteps.none(states[list(self.problems)[-1]])
         for name in reversed(self.problems):
             problem, state = self.problems[name], states[name]
             if not found and name not in self.objectives:
@@ -398,10 +398,8 @@ class LoadPath(JointProblem):
             own = Partials.of(state, 0.0)
             if name in self.objectives:
                 own = problem.partials_of(self.objectives[name], state)
-            found[name] = problem.differentiate(
-                state, with_later_steps(state, own, by_position) if found else own
-            )
-            by_position = by_slip_origin(state, own, found[name].adjoint_multiplier)
+            found[name], whole = problem.differentiated(state, later.added(state, own) if found else own)
+            later = later.before(state, whole, found[name].adjoint_multiplier)
         alpha = np.array(alpha, dtype=float)
         parts = {name: replace(found[name], alpha=alpha) for name in self.problems if name in found}
         value = sum(part.value for part in parts.values())

@@ -1,107 +1,55 @@
-"""Adjoint of states whose friction coefficients are those of their slips."""
+"""Friction coefficients that are those of slips, as the adjoint knows them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.design.adjoint import Adjoint, LinearisedFace, solve_adjoint, with_later_steps
+from fenics_contact.design.adjoint import Adjoint, Coupling, LinearisedFace, with_slips
 from fenics_contact.design.contact_derivatives import bound_sensitivity
 from fenics_contact.design.objective import Partials
-from fenics_contact.errors import ConvergenceError
-from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.linear_state import LinearState
 
 
-def solve_following_slip(
-    state: LinearState,
-    partials: Partials,
-    linearised: LinearisedFace,
-    *,
-    tolerance: float,
-    start: np.ndarray | None = None,
-    max_adjoints: int = 100,
-) -> tuple[Adjoint, Partials]:
-    """Solve the adjoint of a state and of the coefficients μ(s) that agree with its slips s. Collective.
+@dataclass(frozen=True, eq=False)
+class SlipFriction(Coupling):
+    """Coefficients μ(s) that agree with the slips s of a state.
 
-    With coefficients held, the adjoint w gives ∂J/∂Ψ of slip bounds. By Ψ = μ(s) λ_N these depend on slips,
-    which the objective depends on in turn by y = ∂J/∂Ψ λ_N μ'(s), along the slip. The adjoint is linear in
-    the objective: y = b + M y, which GMRES solves at the cost of an adjoint for each product. Returns the
-    adjoint, and the derivatives of the objective with those by the slips.
+    With coefficients held, the adjoint gives ∂J/∂Ψ of slip bounds. By Ψ = μ(s) λ_N these depend on slips,
+    which the objective depends on in turn by y = ∂J/∂Ψ λ_N μ'(s), along the slip.
+
+    `slope`: ∂Ψ/∂s of frictional points, (n_friction,), [force / length]; `direction`: of their slips.
     """
-    torn, spent = state.torn, 0
-    slope, direction = _slopes(state)
-    chosen = np.flatnonzero(slope)
-    nothing = replace(
-        partials,
-        by_displacement=0.0 * partials.by_displacement,
-        by_multiplier=0.0 * partials.by_multiplier,
-        by_motion=0.0,
-        by_area=0.0,
-        by_jump=0.0,
-    )
 
-    def following(own: Partials, y: np.ndarray) -> Partials:
-        by_slip = np.zeros_like(direction)
-        by_slip[chosen] = y[:, None] * direction[chosen]
-        return with_later_steps(state, own, _on_rows(torn, by_slip)) if len(y) else own
+    state: LinearState
+    linearised: LinearisedFace
+    slope: np.ndarray
+    direction: np.ndarray
 
-    def solved(own: Partials, begin: np.ndarray | None = None) -> tuple[Adjoint, np.ndarray]:
-        nonlocal spent
-        adjoint = solve_adjoint(state, own, linearised, tolerance=tolerance, start=begin)
-        spent += adjoint.iterations
-        by_bound = bound_sensitivity(torn, own.by_multiplier, adjoint.displacement, linearised)
-        return adjoint, (slope * by_bound)[chosen]
+    @classmethod
+    def of(cls, state: LinearState, linearised: LinearisedFace) -> SlipFriction:
+        """Return that of a state. Collective."""
+        torn, contact = state.torn, state.contact
+        slip, pressed = contact.total_slip[torn.frictional], contact.normal_force[torn.frictional]
+        way, slope = np.linalg.norm(slip, axis=1), np.zeros(len(slip))
+        pairs = torn.points.pair[torn.frictional]
+        for number, pair in enumerate(torn.scene.contacts):
+            if pair.slip_table is not None:
+                slope[pairs == number] = pair.slip_table.growth(way[pairs == number])
+        slope[torn.groups.slips.strength.limited(pressed)] = 0.0
+        slope[way == 0.0] = 0.0
+        return cls(state, linearised, slope * pressed, slip / np.where(way > 0.0, way, 1.0)[:, None])
 
-    adjoint, right = solved(partials, start)
-    if np.any(right):
-        y = _smallest_residual(lambda y: y - solved(following(nothing, y))[1], right, tolerance, max_adjoints)
-        partials = following(partials, y)
-        adjoint, _ = solved(partials, start)
-    return replace(adjoint, iterations=spent), partials
+    def read(self, partials: Partials, adjoint: Adjoint) -> np.ndarray:
+        """Return y where coefficients change with the slip. Collective."""
+        w = adjoint.displacement
+        by_bound = bound_sensitivity(self.state.torn, partials.by_multiplier, w, self.linearised)
+        return np.asarray((self.slope * by_bound)[self.slope != 0.0])
 
-
-def _smallest_residual(
-    apply: Callable[[np.ndarray], np.ndarray], right: np.ndarray, tolerance: float, most: int
-) -> np.ndarray:
-    """Solve A y = b by GMRES; products are few and dear, so all are kept."""
-    size = reached = float(np.linalg.norm(right))
-    ways, images, following = np.zeros((len(right), 0)), np.zeros((len(right), 0)), right
-    for _ in range(most):
-        for _again in range(2):  # against rounding
-            following = following - ways @ (ways.T @ following)
-        ways = np.column_stack([ways, following / (np.linalg.norm(following) or 1.0)])
-        following = apply(ways[:, -1])
-        images = np.column_stack([images, following])
-        shares = np.linalg.lstsq(images, right, rcond=None)[0]
-        reached = float(np.linalg.norm(right - images @ shares))
-        if reached <= tolerance * size:
-            return np.asarray(ways @ shares)
-    raise ConvergenceError(
-        f"the adjoint of friction by slip needs a relative residual below {tolerance:.1e}, reached "
-        f"{reached / size:.1e} with {most} adjoints: let the coefficient change over a longer slip"
-    )
-
-
-def _slopes(state: LinearState) -> tuple[np.ndarray, np.ndarray]:
-    """Return ∂Ψ/∂s of frictional points, shape (n,), [force / length], and the directions of their slips."""
-    torn, contact = state.torn, state.contact
-    slip, pressed = contact.total_slip[torn.frictional], contact.normal_force[torn.frictional]
-    way, slope = np.linalg.norm(slip, axis=1), np.zeros(len(slip))
-    pairs = torn.points.pair[torn.frictional]
-    for number, pair in enumerate(torn.scene.contacts):
-        if pair.slip_table is not None:
-            slope[pairs == number] = pair.slip_table.growth(way[pairs == number])
-    slope[torn.groups.slips.strength.limited(pressed)] = 0.0
-    slope[way == 0.0] = 0.0
-    return slope * pressed, slip / np.where(way > 0.0, way, 1.0)[:, None]
-
-
-def _on_rows(torn: TornSystem, by_slip: np.ndarray) -> np.ndarray:
-    """Return values at frictional points, shape (n, dim − 1), on the owned rows, zero on others."""
-    result = np.zeros(len(torn.numbering.owned))
-    place = torn.numbering.owned_index(torn.tangential_rows.ravel())
-    result[place[place >= 0]] = by_slip.ravel()[place >= 0]
-    return result
+    def following(self, partials: Partials, y: np.ndarray) -> Partials:
+        """Return the derivatives with those by the slips. Collective."""
+        by_slip = np.zeros((self.state.torn.points.count, self.direction.shape[1]))
+        chosen = np.flatnonzero(self.slope)
+        by_slip[self.state.torn.frictional[chosen]] = y[:, None] * self.direction[chosen]
+        return with_slips(self.state, partials, by_slip)

@@ -64,10 +64,29 @@ class PointWear(Unworn):
 
     def depth_over(self, distance: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """Return the depth that distances take that include the factor, shape (n_contact,), [length]."""
-        rate = np.zeros(len(self.factor))
+        return distance * self.of_curves("rate", pressure)
+
+    def of_curves(self, member: str, pressure: np.ndarray) -> np.ndarray:
+        """Return rates or growths of the curves, zero without pressure, (n_contact,)."""
+        result = np.zeros(len(self.factor))
         for _, wear, mine in self.laws:
-            rate[mine] = wear.curve.rate(pressure[mine])
-        return distance * rate
+            pressed = mine[pressure[mine] > 0.0]
+            result[pressed] = getattr(wear.curve, member)(pressure[pressed])
+        return result
+
+    def by_way(self, way: np.ndarray) -> np.ndarray:
+        """Return the derivative of `distance` by the lengths of slips, (n_contact,)."""
+        result = np.zeros(len(self.factor))
+        for _, wear, mine in self.laws:
+            result[mine] = self.factor[mine] * (wear.by_slip & wear.grows_at(way[mine]))
+        return result
+
+    def by_place(self, way: np.ndarray) -> np.ndarray:
+        """Return the derivative of `distance` by the places of slave nodes, (n_contact, dim)."""
+        result = np.zeros(self.places.shape)
+        for place, wear, mine in self.laws:
+            result[mine] = wear.by_place(place, self.places[mine], way[mine])
+        return result
 
     def on(self, torn: TornSystem, distance: np.ndarray) -> TornSystem:
         """Return a system that has lost what it had before, and loses more over distances."""

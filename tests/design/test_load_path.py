@@ -23,12 +23,7 @@ from fenics_contact.design import (
     Objective,
     PressureNorm,
 )
-from fenics_contact.design import (
-    adjoint as slip_history,
-)
-from fenics_contact.design import (
-    several as load_path,
-)
+from fenics_contact.design.adjoint import LaterSteps
 from fenics_contact.errors import InvalidInputError
 from tests.design.chains import SOLVER
 from tests.design.load_paths import PathLine, beam, line_of, path_of
@@ -80,18 +75,18 @@ def test_points_open_and_close_again_and_slip_in_both_directions() -> None:
 
 @pytest.mark.parametrize("name", ["floor", "space"])
 def test_without_the_history_of_slip_the_derivative_is_wrong(name: str, monkeypatch: Patch) -> None:
-    monkeypatch.setattr(load_path, "with_later_steps", lambda state, own, later: own)
+    monkeypatch.setattr(LaterSteps, "added", lambda later, state, own: own)
     assert abs(line(name).slope() / line(name).quotient() - 1.0) > 1e-2
 
 
 @pytest.mark.parametrize("derivative", ["by_displacement", "by_jump", "by_motion"])
 def test_every_way_in_which_slip_is_handed_back_counts(derivative: str, monkeypatch: Patch) -> None:
-    whole = slip_history.with_later_steps
+    whole = LaterSteps.added
 
-    def without(state: Any, own: Any, later: Any) -> Any:
-        return replace(whole(state, own, later), **{derivative: getattr(own, derivative)})
+    def without(later: Any, state: Any, own: Any) -> Any:
+        return replace(whole(later, state, own), **{derivative: getattr(own, derivative)})
 
-    monkeypatch.setattr(load_path, "with_later_steps", without)
+    monkeypatch.setattr(LaterSteps, "added", without)
     assert abs(line("beam").slope() / line("beam").quotient() - 1.0) > 1e-3
 
 

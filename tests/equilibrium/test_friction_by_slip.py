@@ -28,7 +28,7 @@ from fenics_contact import (
 from fenics_contact._equilibrium import slip_dependence
 from fenics_contact._equilibrium.passes import Passes
 from fenics_contact._equilibrium.steps import stored_state
-from fenics_contact.design import LoadPath, slip_friction
+from fenics_contact.design import LoadPath, couplings
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, NeoHooke
@@ -149,9 +149,9 @@ def test_derivatives_of_several_load_steps_and_of_too_steep_friction_are_refused
     path = LoadPath(blocks, [LoadStep("press"), LoadStep("again")])
     with pytest.raises(InvalidInputError, match="with friction by slip need one load step"):
         path(np.zeros(path.size))
-    with pytest.raises(ConvergenceError, match="of friction by slip needs a relative residual below"):
-        slip_friction._smallest_residual(lambda y: np.roll(y, 1), np.eye(5)[0], 1e-9, 3)
-    turned = slip_friction._smallest_residual(lambda y: np.roll(y, 1), np.eye(5)[0], 1e-9, 5)
+    with pytest.raises(ConvergenceError, match="of friction or wear by slip needs a relative residual below"):
+        couplings._smallest_residual(lambda y: np.roll(y, 1), np.eye(5)[0], 1e-9, 3)
+    turned = couplings._smallest_residual(lambda y: np.roll(y, 1), np.eye(5)[0], 1e-9, 5)
     np.testing.assert_allclose(turned, np.eye(5)[4], atol=1e-12)
 
 

@@ -93,6 +93,7 @@ from fenics_contact.design import (
     FrictionWork,
     LargestPressure,
     LargestStress,
+    LargestWornDepth,
     LinearConstraints,
     LoadCases,
     LoadPath,
@@ -110,6 +111,9 @@ from fenics_contact.design import (
     TotalPotential,
     VolumeIntegral,
     WeakChoice,
+    WearNonuniformity,
+    WornDepthNorm,
+    WornVolume,
 )
 from fenics_contact.design.adjoint import linearise_face, solve_adjoint
 from fenics_contact.design.remeshed import Remeshing
@@ -230,6 +234,7 @@ def objects() -> dict[str, Any]:
         ContactForces(lambda contact: (0.0, np.zeros(1), np.zeros((1, 2)))),
         TotalPotential() + 2.0 * VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),
         StrainEnergy(), PressureNorm(), PressureNonuniformity(), ContactArea(), FrictionWork(),
+        WornVolume(), LargestWornDepth(), WornDepthNorm(), WearNonuniformity(),
         LargestStress("block"), Movement("block", "z1", (1, 0, 0)),
         StressNear("block", (0, 0, 0), 1.0), MovementNear("block", (0, 0, 0), 1.0, direction=(1, 0, 0)),
         Maximum((LargestPressure(),)), PeakPressure(), goal_error(state, StrainEnergy()),
