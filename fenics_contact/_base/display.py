@@ -266,7 +266,7 @@ def counted(number: int, one: str, many: str = "") -> str:
 
 @dataclass(frozen=True)
 class DerivedUnits:
-    """Names of units of forces, of moments and energies, and of areas of surfaces.
+    """Names of units of forces, of moments and energies, of areas of surfaces and of volumes.
 
     `per`: what follows behind them, " per revolution" of bodies of revolution.
     """
@@ -275,6 +275,7 @@ class DerivedUnits:
     moment: str
     area: str
     per: str
+    volume: str
 
     @classmethod
     def of(cls, force: str, length: str, scene: Mapping[str, Any]) -> DerivedUnits:
@@ -283,7 +284,8 @@ class DerivedUnits:
         plane = scene.get("dimension") == 2 and not turned and not scene.get("thickness")
         each = f"/{length}" if plane else ""
         area, per = length if plane else f"{length}²", " per revolution" if turned else ""
-        return cls(f"{force}{each}", f"{force} {length}{each}", area, per)
+        volume = f"{length}²" if plane else f"{length}³"
+        return cls(f"{force}{each}", f"{force} {length}{each}", area, per, volume)
 
 
 def name_in_words(name: str) -> str:

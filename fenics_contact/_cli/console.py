@@ -36,10 +36,10 @@ from fenics_contact.errors.memory import naming_memory
 from fenics_contact.output.files import OutputError
 from fenics_contact.output.result import listed_forces, scales_of
 from fenics_contact.results.by_name import names_of
-from fenics_contact.results.contact import NormalForces
+from fenics_contact.results.contact import NormalForces, pairs_in_words
 from fenics_contact.results.joints import joint_results
 from fenics_contact.results.resolution import in_words
-from fenics_contact.results.state import State, pairs_in_words
+from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -276,7 +276,8 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
         "total potential": f"{state.energies.total_potential:.6g} {energy}",
         "displacement": f"up to {_largest_displacement(state):.4g} {units.length}",
     }
-    for number, words in enumerate(pairs_in_words(state.scene, state.contact, force, units.stress)):
+    pairs = pairs_in_words(state.scene, state.contact, force, units.stress, units.length)
+    for number, words in enumerate(pairs):
         rows[f"contact {number}"] = words
     for number, motion in enumerate(state.rigid_motions()):
         rows[f"rigid surface {number}"] = str(motion).replace("[length]", units.length)

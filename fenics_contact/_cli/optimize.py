@@ -27,7 +27,7 @@ from fenics_contact.output.paraview import ResultSeries, file_of_each, write_vtu
 from fenics_contact.output.result import write_optimisation_result
 from fenics_contact.output.surfaces import write_design_table, write_stl
 from fenics_contact.output.tables import write_contact_table
-from fenics_contact.results.state import pairs_in_words
+from fenics_contact.results.contact import pairs_in_words
 
 _MILLIMETRES = {"µm": 1e-3, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 
@@ -207,7 +207,8 @@ def _facts(file: SceneFile, task: ShapeTask, done: _Done) -> dict[str, str]:
     for name, point in (("before", before), ("after", after)):
         state = point.state
         force = DerivedUnits.of(units.force, units.length, state.scene.dimension_record).force
-        for number, words in enumerate(pairs_in_words(state.scene, state.contact, force, units.stress)):
+        pairs = pairs_in_words(state.scene, state.contact, force, units.stress, units.length)
+        for number, words in enumerate(pairs):
             rows[f"contact {number} {name}"] = words
     volume, start = problem.volume(result.x)[0], problem.volume(task.start)[0]
     rows["volume"] = f"{volume / start:.6f} of that at the start"

@@ -35,6 +35,7 @@ from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
+from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.resolution import BetweenNodes, FacetsOutside, PeakUncertainty
 from fenics_contact.results.state import State
@@ -385,8 +386,7 @@ def _passing_nodes(state: State, number: int, moved: float) -> list[Doubt]:
     if pair.by_mortar or not pair.between_bodies or pair.is_self_contact or pair.single_nodes:
         return []
     deep = _depth(state, number, pair, pair.master_surface)
-    if pair.closure is not None:
-        deep += float(state.contact.gap[state.contact.on_pair(number)].min(initial=0.0))
+    deep += _nearest(state.contact, number)
     if deep <= SHARE * moved:
         return []
     words = (
@@ -412,7 +412,7 @@ def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> l
     own = _moves(state, pair.slave)[slave.nodes[hit.point]]
     other = _moves(state, pair.master_surface)[master.nodes]
     gap = hit.gap + np.einsum("nd,nd->n", hit.normal, own - node_weights(master, hit) @ other)
-    deep = -float(gap.min(initial=0.0))
+    deep = -float(gap.min(initial=0.0)) + _nearest(contact, number)
     if deep <= most * moved:
         return []
     words = (
@@ -421,6 +421,12 @@ def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> l
         "for this contact, refine them there; discretisation='node' closes single nodes"
     )
     return [Doubt(number, Kind.OPEN_MEANS, words)]
+
+
+def _nearest(contact: ContactResult, number: int) -> float:
+    """Return minus how far unworn surfaces may be inside one another, by closures and wear, [length]."""
+    mine = contact.on_pair(number)
+    return float((contact.gap - contact.worn_depth)[mine].min(initial=0.0))
 
 
 def _moves(state: State, surface: Surface) -> np.ndarray:

@@ -229,6 +229,8 @@ def _contact(record: Record, units: Units) -> str:
                 ("area", "area in contact", derived.area),
                 ("smallest_gap", "smallest gap", units.length),
                 ("largest_slip", "largest slip of the last step", units.length),
+                ("worn_volume", "worn volume", derived.volume),
+                ("worn_depth", "largest worn depth", units.length),
             )
             if entry.get(name) is not None
         ]

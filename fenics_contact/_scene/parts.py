@@ -105,6 +105,11 @@ class SceneParts:
         return any(body.deforms_much for body in self.bodies.values())
 
     @property
+    def wears(self) -> bool:
+        """Whether one of its contact pairs loses material."""
+        return any(pair.wears for pair in self.contacts)
+
+    @property
     def is_nonlinear(self) -> bool:
         """Whether some material's stress is no linear function of the displacement."""
         return any(is_nonlinear(each) for body in self.bodies.values() for each in body.materials)

@@ -1,4 +1,4 @@
-"""Constants that are hardly meant: a Young's modulus in other units than lengths, friction in per cent."""
+"""Constants that are hardly meant: moduli and wear in other units than lengths, friction in per cent."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
 from fenics_contact.materials.elastic import isotropic_constants
 
@@ -44,3 +45,27 @@ def odd_values(scene: Scene) -> Iterator[str]:
                     f"materials, of which rubber on dry asphalt has about 1: {given / 100:g} if it is meant "
                     "in per cent; surfaces that never part nor slip are a Tie"
                 )
+        yield from _odd_wear(scene, pair)
+
+
+def _odd_wear(scene: Scene, pair: ContactPair, most: float = 1.0) -> Iterator[str]:
+    """Return words on a coefficient of wear that takes a body away as fast as it slides.
+
+    E k has no dimension: under a pressure of E that much is lost of each length of sliding. It is below 1 for
+    all materials that have been measured. `most`: a larger one is hardly meant.
+    """
+    bodies = (scene.bodies[side.body] for side in pair.surfaces)
+    moduli = [(isotropic_constants(each) or (0.0, 0.0))[0] for body in bodies for each in body.materials]
+    softest = min((young for young in moduli if young > 0.0), default=0.0)
+    for wear in pair.wears:
+        k = wear.coefficient
+        if isinstance(k, int | float) and wear.exponent == 1.0 and k / wear.hardness * softest > most:
+            depth = k / wear.hardness
+            remedy = f"{1e-3 * k:g} if it is meant in mm³/(N m), of which 1 is 1e-3 mm²/N"
+            if wear.hardness != 1.0:
+                remedy = "hardness has the units of Young's modulus"
+            yield (
+                f"odd wear in {pair.place}? a coefficient of {depth:g} times Young's modulus {softest:g} is "
+                f"{depth * softest:.3g}, more than of any materials; of metals and plastics k is "
+                f"1e-9 to 1e-5 mm²/N; {remedy}"
+            )

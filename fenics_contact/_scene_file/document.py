@@ -264,6 +264,10 @@ class StepPart(Part):
     constraints: dict[str, either(list, list[float], float)] = Field(  # type: ignore[valid-type]
         {}, description="name of equations in [[constraints]] -> their value at the end, [length]"
     )
+    cycles: PositiveFloat | None = Field(
+        None,
+        description="how often each of its load steps is repeated, where pairs wear; as before by default",
+    )
 
     def drawn(self, preloads: Sequence[PreloadPart]) -> tuple[Preload, ...] | None:
         """Return the preloads that the step draws together, None where all stay as they were."""
@@ -325,7 +329,11 @@ def load_steps(
                 }
                 drawn = step.drawn(preloads)
                 built.append(
-                    LoadStep(name, acts, holds, time, drawn, pressures or None, constraints=values or None)
+                    LoadStep(
+                        *(name, acts, holds, time, drawn, pressures or None),
+                        constraints=values or None,
+                        cycles=step.cycles,
+                    )
                 )
             for history in (acted, held_up):
                 for part, made in zip(history.parts, history.at(time, 1.0), strict=True):

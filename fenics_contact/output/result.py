@@ -38,7 +38,7 @@ from fenics_contact.output.paraview import checked_name
 from fenics_contact.qp.solution import SolverStep
 from fenics_contact.readers.gmsh_session import interrupt_handler_kept
 from fenics_contact.results.area import contact_area
-from fenics_contact.results.contact import Status
+from fenics_contact.results.contact import Status, worn_from
 from fenics_contact.results.forces import Resultant
 from fenics_contact.results.joints import joint_results
 from fenics_contact.results.linear_state import as_linear
@@ -277,7 +277,8 @@ None where materials dissipate or are nonlinear |
     | ``contact`` | one entry per pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
 ``normal_force`` (the sum of normal forces), ``normal_resultant`` (the size of their vector sum), \
 ``peak_pressure``, where bodies deform much ``peak_nominal_pressure``, ``area``, \
-``smallest_gap``, ``largest_slip`` in the last load step; without friction closed points count as ``slip`` |
+``smallest_gap``, ``largest_slip`` in the last load step, of pairs that wear ``worn_volume`` and the \
+largest ``worn_depth``; without friction closed points count as ``slip`` |
     | ``unheld`` | rigid motions that nothing resists and nothing loads, in words; `State.unheld` |
     | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
 surface, ``force``, ``moment`` and the point ``about`` which it is; where there are any, ``foundations`` \
@@ -503,6 +504,7 @@ def _pair_summary(state: State, number: int) -> dict[str, Any]:
         "area": contact_area(state, number),
         "smallest_gap": float(contact.gap[mine].min()) if len(mine) else None,
         "largest_slip": float(np.linalg.norm(contact.slip[mine], axis=1).max(initial=0.0)),
+        **{name.replace(" ", "_"): value for name, value in worn_from(state.scene, contact, number).items()},
     }
 
 

@@ -17,7 +17,7 @@ from fenics_contact._scene.pairs import pair_number
 from fenics_contact.errors import collectively, together
 from fenics_contact.output.files import write_text
 from fenics_contact.results.area import contact_area
-from fenics_contact.results.contact import Status
+from fenics_contact.results.contact import Status, worn_from
 from fenics_contact.results.forces import Balance, Resultant
 from fenics_contact.results.joints import joint_results
 from fenics_contact.results.state import State
@@ -47,6 +47,7 @@ def write_contact_table(state: State, path: str | Path, *, pair: int | str | Non
     | ``normal_x``, ... | unit normal from master to slave |
     | ``area`` | that belongs to the point, [length²], in the plane [length] |
     | ``wet`` | 1 where fluid has reached it, else 0; only where a pair has a fluid |
+    | ``worn_depth`` | lost by both surfaces since the start, [length]; only where a pair wears |
 
     Rows are in the order of pairs and nodes, on any number of ranks.
 
@@ -117,6 +118,7 @@ def _contact_columns(state: State, displacement: np.ndarray) -> dict[str, np.nda
         **split["normal"],
         "area": contact.area,
         **({} if contact.wet is None else {"wet": contact.wet.astype(int)}),
+        **({"worn_depth": contact.worn_depth} if scene.wears else {}),
     }
 
 
@@ -185,7 +187,7 @@ class StepTable:
     | ``friction_force`` | size of the vector sum of all friction forces, [force] |
     | ``peak_pressure`` | of all pairs, [force / length²] |
     | ``strain_energy``, ``load_energy``, ``friction_energy`` | as in `results.Energies`; empty if not known |
-    | ``surface_energy`` | where surfaces give way |
+    | ``surface_energy`` | where surfaces give way or wear |
     | ``preload NAME`` | force of each preload |
     | ``loads Fx``, ... | force of all loads, and its moment ``loads Mx``, ... |
     | ``loads Fr``, ``loads Fz`` | the same of bodies of revolution, a revolution; with torsion ``loads T`` |
@@ -197,6 +199,7 @@ class StepTable:
     | ``constraint NAME lid Fx``, ... | force of a linear constraint on a body |
     | ``lid bottom on pot rim Fx``, ... | force on the slave of a pair or tie |
     | ``lid bottom on pot rim pressure``, ``... area`` | the largest pressure, and the area of contact |
+    | ``lid bottom on pot rim worn volume``, ``... worn depth`` | of pairs that wear; the largest depth |
 
     The file is complete after every `add`, the same on any number of ranks.
 
@@ -242,7 +245,9 @@ class StepTable:
             pressure = state.contact.pressure[state.contact.on_pair(number)]
             values[f"{each} pressure"] = float(pressure.max(initial=0.0))
             values[f"{each} area"] = contact_area(state, number)
-        soft = any(pair.closure is not None for pair in state.scene.contacts)
+            worn = worn_from(state.scene, state.contact, number)
+            values |= {f"{each} {key}": value for key, value in worn.items()}
+        soft = state.scene.wears or any(pair.closure is not None for pair in state.scene.contacts)
         kinds = ("strain", "load", "friction", *(("surface",) if soft else ()))
         energies = {key: getattr(state.energies, key) for key in kinds}
         named = {"number": len(self._rows), "name": name, "time": state.time if time is None else float(time)}

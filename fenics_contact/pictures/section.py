@@ -173,6 +173,7 @@ _KNOWN = {
     "contact_pressure": ("contact", "contact pressure", "stress"),
     "contact_nominal_pressure": ("contact", "contact pressure by undeformed area", "stress"),
     "contact_force": ("contact", "contact force of a node", "force"),
+    "contact_worn_depth": ("contact", "worn depth", "length"),
     "contact_slip": ("contact", "slip in the last load step", "length"),
     "von_mises": ("means over cells", "von Mises stress of cells", "stress"),
     "stress": ("means over cells", "stress of cells", "stress"),

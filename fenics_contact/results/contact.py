@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenics_contact._base.display import displayed
+from fenics_contact._base.display import DerivedUnits, counted, displayed
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact.qp.solution import Residuals
+
+if TYPE_CHECKING:
+    from fenics_contact._scene.pairs import ContactPair
+    from fenics_contact._scene.scene import Scene
 
 
 class Status(IntEnum):
@@ -230,3 +234,49 @@ def no_contact(points: ContactPoints) -> ContactResult:
         points, nothing, vectors, nothing, nothing, vectors, vectors, np.zeros(0, dtype=np.int64), nothing,
         nothing, np.ones(points.normal.shape[1]),
     )  # fmt: skip
+
+
+def pairs_in_words(
+    scene: Scene, contact: ContactResult, force: str = "", stress: str = "", length: str = ""
+) -> list[str]:
+    """Return a summary of each contact pair: points by status, resultants, largest pressure, and wear."""
+    rows, volume = [], DerivedUnits.of("", length, scene.dimension_record).volume if length else ""
+    units = {"worn volume": volume, "worn depth": length}
+    for number, pair in enumerate(scene.contacts):
+        mine = contact.on_pair(number)
+        pressing = contact.normal_force[mine, None] * contact.points.normal[mine]
+        resultant = contact.normal_forces(number).in_words(force)
+        if pair.has_friction:
+            resultant += f", friction {_size(contact.force[mine] - pressing, force)}"
+        pressure = f"{contact.pressure[mine].max(initial=0.0):.5g} {stress}".rstrip()
+        if scene.deforms_much:
+            nominal = contact.nominal_pressure[mine].max(initial=0.0)
+            pressure += f", nominal {nominal:.5g} {stress}".rstrip()
+        for name, value in worn_from(scene, contact, number).items():
+            pressure += f", {name} {value:.5g} {units[name]}".rstrip()
+        rows.append(
+            f"{pair.place}: {counted(len(mine), 'point')}, {_kinds(pair, contact.status[mine])}; "
+            f"{resultant}, pressure up to {pressure}"
+        )
+    return rows
+
+
+def worn_from(scene: Scene, contact: ContactResult, number: int) -> dict[str, float]:
+    """Return volume and largest depth that a pair has lost by their names, none if it does not wear."""
+    if not scene.contacts[number].wears:
+        return {}
+    deepest = float(contact.worn_depth[contact.on_pair(number)].max(initial=0.0))
+    return {"worn volume": contact.worn_volume(number), "worn depth": deepest}
+
+
+def _size(forces: np.ndarray, unit: str) -> str:
+    """Return the magnitude of the sum of forces, shape (n, dim), with its unit."""
+    return f"{np.linalg.norm(forces.sum(axis=0)):.6g} {unit}".rstrip()
+
+
+def _kinds(pair: ContactPair, status: np.ndarray) -> str:
+    """Return the numbers of points by status; without friction open or closed."""
+    counts = {kind.name.lower(): int(np.count_nonzero(status == kind)) for kind in Status}
+    if not pair.has_friction:
+        counts = {"open": counts["open"], "closed": len(status) - counts["open"]}
+    return ", ".join(f"{count} {name}" for name, count in counts.items())

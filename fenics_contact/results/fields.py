@@ -355,10 +355,11 @@ def contact_fields(
 
     ``contact_status`` is the value of `Status`, −1 on nodes that are not contact points. Zero on those are
     ``contact_pressure``, ``contact_force`` on the slave and ``contact_slip``; where a body of the scene
-    deforms much ``contact_nominal_pressure``, too. By nodes pressures and slip at the corners of quadratic
-    triangles are interpolated, see `filled_at_corners`, and pressures at the ends of quadratic edges on an
-    axis of revolution. A node that belongs to several pairs has their sum, and the status of the last; one
-    whose force is that of a point elsewhere, as on one of both sides of a sector, has the pressure there.
+    deforms much ``contact_nominal_pressure``, where a pair wears ``contact_worn_depth`` of both surfaces,
+    too. By nodes pressures, depth and slip at the corners of quadratic triangles are interpolated, see
+    `filled_at_corners`, and pressures at the ends of quadratic edges on an axis of revolution. A node that
+    belongs to several pairs has their sum, and the status of the last; one whose force is that of a point
+    elsewhere, as on one of both sides of a sector, has the pressure there.
     """
     at = ContactNodes(contact, scene, numbers, body)
     mine, nodes = at.nodes
@@ -367,6 +368,8 @@ def contact_fields(
     pressures = {"contact_pressure": contact.pressure}
     if scene.deforms_much:
         pressures["contact_nominal_pressure"] = contact.nominal_pressure
+    if scene.wears:
+        pressures["contact_worn_depth"] = contact.worn_depth
     return {
         "contact_status": status,
         **{name: np.maximum(at.summed(each, filled=True), 0.0) for name, each in pressures.items()},

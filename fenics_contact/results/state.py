@@ -16,7 +16,6 @@ from fenics_contact._base.display import counted, displayed, in_lines
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.forms import temperature_of
 from fenics_contact._pairing.points import NodeNumbers
-from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError, collectively
 from fenics_contact.feti.averages import nodal_mean, nodal_sum
@@ -26,7 +25,7 @@ from fenics_contact.qp.solution import Solution
 from fenics_contact.results.adjoint_starts import NoAdjointStart
 from fenics_contact.results.by_name import ByName
 from fenics_contact.results.constraints import ConstraintForces
-from fenics_contact.results.contact import ContactResult, RowValues, Status
+from fenics_contact.results.contact import ContactResult, RowValues, pairs_in_words
 from fenics_contact.results.fields import (
     GatheredFields,
     body_mesh,
@@ -80,7 +79,8 @@ class Energies:
         dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc − Φ(λ); None for nonlinear
             materials.
         surface: Stored by surfaces that give way, λᵀC(λ) − Φ(λ) with the closures C = Φ', and by springs
-            between surfaces, N²/(2k); zero without any.
+            between surfaces, N²/(2k); zero without any. Where pairs wear the depth Δw of the load step counts
+            as a closure: λᵀΔw − Φ is not stored, but what `primal` needs to agree with `dual`.
     """
 
     strain: float
@@ -130,39 +130,6 @@ def compute_energies(
     strain, prescribed, given_way, work = (float(total) for total in torn.numbering.comm.allreduce(mine))
     load = torn.load_work(displacement)
     return Energies(strain, load, friction, -strain - prescribed - work, given_way - work)
-
-
-def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress: str = "") -> list[str]:
-    """Return a summary of each contact pair: points by status, resultants, largest pressure."""
-    rows = []
-    for number, pair in enumerate(scene.contacts):
-        mine = contact.on_pair(number)
-        pressing = contact.normal_force[mine, None] * contact.points.normal[mine]
-        resultant = contact.normal_forces(number).in_words(force)
-        if pair.has_friction:
-            resultant += f", friction {_size(contact.force[mine] - pressing, force)}"
-        pressure = f"{contact.pressure[mine].max(initial=0.0):.5g} {stress}".rstrip()
-        if scene.deforms_much:
-            nominal = contact.nominal_pressure[mine].max(initial=0.0)
-            pressure += f", nominal {nominal:.5g} {stress}".rstrip()
-        rows.append(
-            f"{pair.place}: {counted(len(mine), 'point')}, {_kinds(pair, contact.status[mine])}; "
-            f"{resultant}, pressure up to {pressure}"
-        )
-    return rows
-
-
-def _size(forces: np.ndarray, unit: str) -> str:
-    """Return the magnitude of the sum of forces, shape (n, dim), with its unit."""
-    return f"{np.linalg.norm(forces.sum(axis=0)):.6g} {unit}".rstrip()
-
-
-def _kinds(pair: ContactPair, status: np.ndarray) -> str:
-    """Return the numbers of points by status; without friction open or closed."""
-    counts = {kind.name.lower(): int(np.count_nonzero(status == kind)) for kind in Status}
-    if not pair.has_friction:
-        counts = {"open": counts["open"], "closed": len(status) - counts["open"]}
-    return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
 #: A largest relative residual, a share of the discretisation error, or None for the default.

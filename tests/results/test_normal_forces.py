@@ -32,8 +32,8 @@ from fenics_contact.output import StepTable, read_result
 from fenics_contact.output.tables import step_row
 from fenics_contact.pictures import plot_contact_pressure
 from fenics_contact.pictures.curves import contact_trace
-from fenics_contact.results.contact import NormalForces
-from fenics_contact.results.state import State, pairs_in_words
+from fenics_contact.results.contact import NormalForces, pairs_in_words
+from fenics_contact.results.state import State
 
 INNER, OUTER, OVERLAP, E, NU = 12.0, 20.0, 0.01, 2.1e5, 0.3
 #: Pressure of a ring shrunk on a rigid shaft without friction, by Lamé, in plane strain.

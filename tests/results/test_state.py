@@ -43,11 +43,11 @@ from fenics_contact.gallery import block, cylinder, half_disc, hemisphere, recta
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results.area import _reach
+from fenics_contact.results.contact import pairs_in_words
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import contact_result
 from fenics_contact.results.fields import cell_values
 from fenics_contact.results.forces import nodal_forces
-from fenics_contact.results.state import pairs_in_words
 from fenics_contact.theory import hertz_line, hertz_point
 from tests.equilibrium.checks import assert_solved
 from tests.equilibrium.rank_cases import TENSION, uniaxial
