@@ -224,29 +224,44 @@ def _stiffness(element: Element, stiffening: float) -> ufl.Form:
     return weight * ufl.inner(ufl.grad(u), ufl.grad(v)) * volume_measure(element, 2)
 
 
-def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign) -> MeshMotion:
-    """Return how the mesh of a body follows its design. Collective."""
-    name = design.body
-    body = scene.bodies[name]
-    cut, planes = mirrored(scene, name), planes_of(scene)
-    held = cut[:, : scene.dim].copy()
+def held_by_scene(scene: Scene, name: str, cut: np.ndarray) -> np.ndarray:
+    """Return which components of the nodes of a body supports and joints hold in place, (n_nodes, dim).
+
+    `cut`: which nodes lie on which plane of symmetry, along which they may move.
+    """
+    mesh, held = scene.bodies[name].mesh, cut[:, : scene.dim].copy()
     ends = [end for spring in scene.springs for end in spring.surfaces.values()]
     places = [(each.body, each.surface) for each in (*scene.supports, *scene.foundations)]
     for own, surface in (*places, *((end.body, end.name) for end in ends)):
-        if own == name and surface in body.mesh.node_sets:
-            held[body.mesh.node_sets[surface]] = True
+        if own == name and surface in mesh.node_sets:
+            held[mesh.node_sets[surface]] = True
         elif own == name:
-            facets = body.mesh.surfaces[surface]
+            facets = mesh.surfaces[surface]
             held[facets[~cut[facets].all(axis=1).any(axis=1)]] = True
     for constraint in scene.constraints:
         for term in constraint.terms:
             if term.body == name:
-                held[term.nodes_of(body.mesh)] = True
-    for section in body.mesh.cuts.values():
+                held[term.nodes_of(mesh)] = True
+    for section in mesh.cuts.values():
         held[section.pairs] = True
+    return held
+
+
+def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign) -> MeshMotion:
+    """Return how the mesh of a body follows its design. Collective."""
+    body, cut = scene.bodies[design.body], mirrored(scene, design.body)
+    held = held_by_scene(scene, design.body, cut)
     held[design.nodes_beyond_transition(body.mesh, cut)] = True
-    tilted = None if len(planes) == scene.dim else (cut, planes)
-    return MeshMotion(decomposition, name, body, design.lattice.nodes, held, tilted)
+    return moving_with(decomposition, scene, design.body, design.lattice.nodes, held)
+
+
+def moving_with(
+    decomposition: Decomposition, scene: Scene, name: str, moving: np.ndarray, held: np.ndarray
+) -> MeshMotion:
+    """Return how the mesh of a body follows some of its nodes, see `MeshMotion`. Collective."""
+    planes = planes_of(scene)
+    tilted = None if len(planes) == scene.dim else (mirrored(scene, name), planes)
+    return MeshMotion(decomposition, name, scene.bodies[name], moving, held, tilted)
 
 
 def moving_nodes(
@@ -282,6 +297,23 @@ def volume_by_points(mesh: BodyMesh, measure: Measure = PLAIN) -> np.ndarray:
     return result
 
 
+def require_movable(scene: Scene, what: str) -> None:
+    """Reject scenes whose meshes cannot be moved; `what`: needs that."""
+    for name, body in scene.bodies.items():
+        require_none(
+            body.mesh.followers, f"{what} with body {name!r}", "refine it everywhere, or take simplices"
+        )
+        if body.mesh.has_several_shapes:
+            raise InvalidInputError(
+                f"{what} needs bodies with one shape of cells, {name!r} has {body.mesh.cells_in_words}"
+            )
+    if scene.sectors:
+        raise InvalidInputError(
+            f"{what} needs scenes without cyclic symmetry, got {scene.sectors[0].place}: model all, or a "
+            "sector between planes of symmetry by Roller"
+        )
+
+
 class DesignGeometry:
     """The moving surfaces of a scene with their mesh motions, shared by all load cases of a design.
 
@@ -290,19 +322,7 @@ class DesignGeometry:
 
     def __init__(self, scene: Scene, decomposition: Decomposition, designs: Sequence[SurfaceDesign]) -> None:
         """Prepare the mesh motion. Collective on the decomposition's communicator."""
-        for name, body in scene.bodies.items():
-            require_none(
-                body.mesh.followers, f"a design with body {name!r}", "refine it everywhere, or take simplices"
-            )
-            if body.mesh.has_several_shapes:
-                raise InvalidInputError(
-                    f"designs need bodies with one shape of cells, {name!r} has {body.mesh.cells_in_words}"
-                )
-        if scene.sectors:
-            raise InvalidInputError(
-                f"designs need scenes without cyclic symmetry, got {scene.sectors[0].place}: model all, or a "
-                "sector between planes of symmetry by Roller"
-            )
+        require_movable(scene, "a design")
         self.designs = tuple(design.on(scene) for design in designs)
         self.size = sum(design.size for design in self.designs)
         self._bodies, self._decomposition = dict(scene.bodies), decomposition

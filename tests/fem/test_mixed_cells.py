@@ -175,7 +175,7 @@ def test_what_is_not_built_is_refused_in_words() -> None:
     with pytest.raises(InvalidInputError, match=r"refined needs cells of one shape, .* 28 pyramids, "):
         refined(mesh, [0])
     scene = Scene({"bar": Body(mesh, soft)}, [Support("bar", "x0")])
-    with pytest.raises(InvalidInputError, match=r"designs need bodies with one shape .* 'bar' has 40 tetra"):
+    with pytest.raises(InvalidInputError, match=r"a design needs bodies with one shape .* has 40 tetra"):
         DesignGeometry(scene, None, [])
     lean = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (1, 1, 1))))
     whole = Scene({"box": Body(lean, soft)}, [Support("box", "x0")])
