@@ -20,7 +20,7 @@ OPENING = 0.035
 def carrying(pair: ContactPair, slave: FacetedSurface, master: Master) -> np.ndarray:
     """Return which nodes of the undeformed slave of a pair may carry a point, shape (len(slave.nodes),)."""
     areas, (end, middle) = slave.areas > 0.0, slave.discs
-    if not len(end) or pair.acts_by_area:
+    if not len(end) or pair.closure is not None or pair.fluid is not None:  # these act by area
         return areas
     places = slave.points[middle]
     across, away = master.normals_at(places, slave.normals[middle]), places - slave.points[end]

@@ -464,11 +464,6 @@ class ContactPair(PairPart):
         """The law of wear, if there is one."""
         return () if self.wear is None else (self.wear,)
 
-    @property
-    def acts_by_area(self) -> bool:
-        """Whether something depends on the pressure of each point, which needs an area."""
-        return self.closure is not None or bool(self.fluids or self.wears)
-
     def repeated(self, cycles: float) -> ContactPair:
         """Return the pair whose wear, if it has any, is that of so many cycles of a load step."""
         return replace(self, wear=replace(*self.wears, cycles=cycles)) if self.wears else self

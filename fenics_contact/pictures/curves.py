@@ -133,6 +133,7 @@ class ContactTrace:
     `pressure`: on all nodes, zero where there is no contact point; `traction`: tangential traction on the
     slave in the direction of increasing positions; with torsion its size; `slip`: slip of the contact points
     on the master in the last load step, in the direction of increasing positions, with torsion its size;
+    `worn`: depth that both surfaces have lost on all nodes, zero where the pair does not wear, `wears`;
     `shear`: resultant of the traction, with torsion its torque about the axis; `space`: the dimension that
     the scene records, which gives forces their unit.
     """
@@ -144,12 +145,14 @@ class ContactTrace:
     pressure: np.ndarray
     traction: np.ndarray
     bound: np.ndarray
+    worn: np.ndarray
     points: np.ndarray
     status: np.ndarray
     slip: np.ndarray
     normal_forces: NormalForces
     shear: float
     rubs: bool
+    wears: bool
     space: Mapping[str, Any]
     twists: bool = False
 
@@ -196,15 +199,16 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
         friction = np.linalg.norm(contact.friction_force, axis=1)
         slip = np.linalg.norm(contact.slip[chosen], axis=1)
         shear = -contact.friction_force[chosen, 1] @ mesh.points[order[points], 0]
-    values = np.zeros((3, len(order)))
-    forces = np.stack([contact.normal_force, friction, contact.slip_bound])
-    every, given = contact.points.of_surface(pair, (forces / contact.area).T)
+    values = np.zeros((4, len(order)))
+    by_area = np.stack([contact.normal_force, friction, contact.slip_bound]) / contact.area
+    every, given = contact.points.of_surface(pair, np.vstack([by_area, contact.worn_depth]).T)
     values[:, sorting[np.searchsorted(numbers, every, sorter=sorting)]] = given.T
     return ContactTrace(
-        f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],
-        points, contact.status[chosen], slip,
+        f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1,
+        values[0], values[1], values[2], values[3], points, contact.status[chosen], slip,
         contact.normal_forces(pair), float(shear),
-        state.scene.contacts[pair].has_friction, state.scene.dimension_record, state.scene.torsion,
+        state.scene.contacts[pair].has_friction, bool(state.scene.contacts[pair].wears),
+        state.scene.dimension_record, state.scene.torsion,
     )  # fmt: skip
 
 

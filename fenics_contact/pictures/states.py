@@ -566,7 +566,8 @@ def plot_contact_pressure(
     Left, or above, the nodal pressure, then the status of the points with the direction of slip on the
     master. A surface around an axis that carries force on sides facing away, such as a bore, is unrolled; of
     others the title says how many closed points are not seen. For a plane scene the pressure along the slave
-    surface, below it the tangential traction on the slave between its bounds, with the status of the points.
+    surface, below it the tangential traction on the slave between its bounds, with the status of the points;
+    where the pair wears last the depth that it has lost. In space that is the field ``contact_worn_depth``.
 
     Args:
         state: The state.

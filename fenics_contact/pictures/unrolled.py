@@ -344,7 +344,7 @@ def draw_traction(
     units: Units,
     width: int,
 ) -> None:
-    """Draw the pressure above and, where friction acts, the tangential traction on the slave below.
+    """Draw the pressure above and, where friction acts, the tangential traction on the slave below, and wear.
 
     ``window`` holds the range of the pressure and the extent of the picture, () and 0 for automatic ones.
     """
@@ -359,9 +359,10 @@ def draw_traction(
         )
         facts += f", {what} {written(shear)} {unit}{names.per}"
     top = float(trace.pressure.max()) or 1.0
-    height = round((0.62 if rubs else 0.4) * width)
+    count = 1 + rubs + trace.wears
+    height = round((0.4 + 0.22 * (count - 1)) * width)
     with sheet(paper, (width, height), headline(title, facts)) as figure:
-        rows = figure.subplots(2 if rubs else 1, 1, sharex=True, squeeze=False)[:, 0]
+        rows = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
         _curve(rows[0], trace, trace.pressure, BLUE)
         _symbols(rows[0], trace, trace.pressure)
         rows[0].set_ylabel(f"contact pressure ({units.stress})")
@@ -369,6 +370,8 @@ def draw_traction(
         rows[0].set_ylim(*(clim or (-0.05 * top, 1.08 * top)))
         if rubs:
             _draw_friction(rows[1], trace, units)
+        if trace.wears:
+            _draw_wear(rows[-1], trace, units)
         rows[-1].set_xlabel(f"{trace.axis} ({units.length})")
         rows[-1].set_xlim(*trace.window(reach))
         for axes in rows:
@@ -376,6 +379,16 @@ def draw_traction(
             axes.yaxis.set_major_locator(MaxNLocator(6))
         handles, labels = rows[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
+
+
+def _draw_wear(axes: Axes, trace: ContactTrace, units: Units) -> None:
+    """Draw the worn depth downwards, as the surfaces have lost it."""
+    _curve(axes, trace, trace.worn, INK)
+    axes.fill_between(trace.broken(trace.places), trace.broken(trace.worn), color=PALE, linewidth=0)
+    axes.invert_yaxis()
+    axes.set_ylabel(f"worn depth ({units.length})")
+    deepest = written(float(trace.worn.max()))
+    axes.set_title(f"depth lost by both surfaces since the start, up to {deepest} {units.length}")
 
 
 def _draw_friction(axes: Axes, trace: ContactTrace, units: Units) -> None:

@@ -17,22 +17,29 @@ from fenics_contact import (
     ContactPair,
     ContactProblem,
     LoadStep,
+    RigidPlane,
     Scene,
     State,
     Support,
     Surface,
     Wear,
     read_scene_file,
+    result_page,
+    solve_scene,
     solve_steps,
     write_result,
 )
 from fenics_contact._equilibrium import warnings
 from fenics_contact._scene.plausible import odd_values
 from fenics_contact.gallery import rectangle
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import quadratic
 from fenics_contact.output import StepTable, read_result, write_contact_table
+from fenics_contact.pictures import plot_contact_pressure
+from fenics_contact.pictures.curves import contact_trace
 from fenics_contact.results.contact import pairs_in_words
 from tests.equilibrium.wear_cases import YOUNG, fretted, punch, worn
+from tests.page.contents import content
 from tests.scene_file.texts import STEPS, changed
 
 COMM = MPI.COMM_SELF
@@ -103,16 +110,16 @@ def test_steps_of_scene_files_are_repeated(tmp_path: Path) -> None:
     assert contact.worn_volume() > 0.0
 
 
-@pytest.mark.parametrize(("given", "remedy"), [({}, "1e-06 if"), ({"hardness": 0.5}, "hardness has the")])
+@pytest.mark.parametrize(("given", "remedy"), [({}, "1e-05 if"), ({"hardness": 0.5}, "hardness has the")])
 def test_a_coefficient_in_other_units_is_reported_before_it_is_solved(
     given: dict[str, Any], remedy: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    k = 1e-3 * given.get("hardness", 1.0)
+    k = 1e-2 * given.get("hardness", 1.0)
     with caplog.at_level(logging.WARNING):
         ContactProblem(punch(Wear(k, sliding=0.01, **given)), COMM).solve()
     (record,) = [each.message for each in caplog.records if each.message.startswith("odd wear")]
     assert record.startswith(
-        f"odd wear in punch y0 on rigid plane? a coefficient of 0.001 times Young's modulus {YOUNG:g} is 2"
+        f"odd wear in punch y0 on rigid plane? a coefficient of 0.01 times Young's modulus {YOUNG:g} is 20,"
     )
     assert remedy in record
     usual = Wear(k / 100.0, sliding=0.01, **given)
@@ -152,6 +159,30 @@ def test_bodies_whose_meshes_pass_by_what_wears_give_no_warning(
     assert any(words in message for message in caplog.messages)
 
 
-def test_a_pair_that_wears_acts_by_area() -> None:
-    (dry,), (wet,) = punch(None).contacts, punch(Wear(1e-8)).contacts
-    assert (dry.acts_by_area, wet.acts_by_area) == (False, True)
+def test_a_tip_on_an_axis_wears_by_its_force_and_way() -> None:
+    """It presses alone under a cone at first; no area of a uniform pressure belongs to it."""
+    mesh = quadratic(rectangle((0.0, -1.2), (1.2, 0.0), (6, 6)))
+    cone = RigidPlane((0.0, -0.02), np.array([1.0, -2.7]) / np.hypot(1.0, 2.7))
+    pair = ContactPair(Surface("block", "y1"), cone, interference="measured", wear=Wear(1e-5, sliding=2.0))
+    block = Body(mesh, IsotropicElasticity(2e4, 0.3), axisymmetric=True)
+    contact = solve_scene(Scene({"block": block}, [Support("block", "y0")], contacts=[pair]), COMM).contact
+    assert contact.normal_force.sum() > 1.0
+    assert contact.worn_volume() == pytest.approx(2e-5 * contact.normal_force.sum(), rel=1e-10)
+
+
+def test_the_curve_of_a_pair_that_wears_has_the_depth(fretting: State, dry: State) -> None:
+    trace, plain = contact_trace(fretting, 0), contact_trace(dry, 0)
+    assert (trace.wears, plain.wears) == (True, False)
+    assert trace.worn.max() == fretting.contact.worn_depth.max() > 0.0
+    np.testing.assert_array_equal(trace.worn[trace.points], fretting.contact.worn_depth)
+    assert not plain.worn.any()
+    png = plot_contact_pressure(fretting, width=800).png, plot_contact_pressure(dry, width=800).png
+    heights = [int.from_bytes((each or b"")[20:24], "big") for each in png]
+    assert heights[0] - heights[1] == round(0.22 * 800)
+
+
+def test_a_page_has_what_wears(fretting: State) -> None:
+    known, _ = content(result_page(fretting).html)
+    names = {entry["name"]: entry for entry in known["fields"]}
+    assert names["contact_worn_depth"]["label"] == "worn depth"
+    assert names["contact_worn_depth"]["extremes"][0][1] == pytest.approx(fretting.contact.worn_depth.max())
