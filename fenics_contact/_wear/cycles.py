@@ -18,6 +18,7 @@ from fenics_contact._equilibrium.steps import problem_of, require_steps
 from fenics_contact._scene.checks import check_positive
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._wear.kept import KeptInFile, NotKept
+from fenics_contact._wear.shapes import Follower, ShapeLost
 from fenics_contact._wear.track import Track
 from fenics_contact.errors import ConvergenceError, InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
@@ -108,7 +109,8 @@ class WearHistory:
 
     Attributes:
         jumps: One entry for each jump, in their order.
-        state: The state at the end of the finer history.
+        state: The state at the end of the finer history; its scene has the shape that has followed so far,
+            and its contact the depth that is still a gap.
         depth: Depth that its contact points have lost, extrapolated from both histories, shape (n_contact,),
             [length].
         depth_error: Its estimated error, the difference of both histories, shape (n_contact,), [length].
@@ -147,6 +149,7 @@ def wear_to(
     tolerance: float = 0.01,
     limits: WearLimits = WearLimits(),
     checkpoint: Checkpoint | None = None,
+    follow: float = 0.2,
 ) -> WearHistory:
     """Follow wear over many cycles, in jumps whose error is estimated and kept small. Collective.
 
@@ -168,6 +171,9 @@ def wear_to(
         limits: Depth, volume or pressure at which the history ends.
         checkpoint: File that is written after each jump and from which an interrupted history goes on, also
             to more cycles or other limits, on any number of ranks.
+        follow: Worn depth, relative to the size of facets, beyond which the meshes lose it and gaps are
+            those of the new shape, ≥ 0; before it is a gap. `np.inf`: it always is, as where bodies deform
+            much, and where pairs give their gaps. A history whose shape cannot follow ends, and says so.
 
     Raises:
         InvalidInputError: If no pair wears, nothing slides in a cycle, or an argument is outside its range.
@@ -191,11 +197,19 @@ def wear_to(
             raise InvalidInputError(
                 "wear_to needs a pair that wears, got none: give ContactPair(wear=Wear(k))"
             )
+        if not follow >= 0.0:
+            raise InvalidInputError(f"follow must not be negative, got {follow:g}: give np.inf for never")
     kept = NotKept()
     if checkpoint is not None:
+        if np.isfinite(follow):
+            raise InvalidInputError(
+                f"checkpoints of wear do not keep shapes, got follow={follow:g}: give follow=np.inf, or "
+                "leave the checkpoint out"
+            )
         every = (*first, *steps)
         kept = KeptInFile(checkpoint, problem, every, first=len(first), tolerance=tolerance)
-    return _Pair(problem, steps, first, tolerance, limits, kept).to(cycles)
+    begun = Track(problem, problem.scene, follower=Follower(follow))
+    return _Pair(begun, steps, first, tolerance, limits, kept).to(cycles)
 
 
 class _Pair:
@@ -211,7 +225,7 @@ class _Pair:
 
     def __init__(
         self,
-        problem: ContactProblem,
+        begun: Track,
         steps: Sequence[LoadStep],
         first: Sequence[LoadStep],
         tolerance: float,
@@ -219,11 +233,10 @@ class _Pair:
         kept: NotKept,
     ) -> None:
         self._steps, self._tolerance, self._limits, self._kept = steps, tolerance, limits, kept
-        self._comm = problem.comm
-        self._whole = any(wear.by_slip for pair in problem.scene.contacts for wear in pair.wears)
+        self._comm = begun.problem.comm
+        self._whole = any(wear.by_slip for pair in begun.scene.contacts for wear in pair.wears)
         self._singly = 1.0
         self._next, self.jumps = 0.0, list[WearJump]()
-        begun = Track(problem, problem.scene)
         tracks, arrays = kept.recalled(begun.at_end_of((*first, *steps)))
         if tracks:
             self._coarse, self._fine = tracks
@@ -244,7 +257,13 @@ class _Pair:
                 rest -= self.end * cycles if rest > 1.01 * self.end * cycles else 0.0
                 jump, done = min(jump, rest) if jump < 0.75 * rest else rest, len(self.jumps)
                 singly = self._whole and jump < 2.0
-                jump = self._singles(rest) if singly else self._jump(jump, self.least * cycles)
+                try:
+                    jump = self._singles(rest) if singly else self._jump(jump, self.least * cycles)
+                except ShapeLost as failure:
+                    if not self.jumps:
+                        raise
+                    reason = str(failure)
+                    break
                 if len(self.jumps) > done:
                     self._keep(jump)
                     task.step(round(self._last.cycles), words=f"depth {self._last.depth:.4g}")

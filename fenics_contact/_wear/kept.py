@@ -90,4 +90,5 @@ def _restored(track: Track, stored: Mapping[str, np.ndarray]) -> Track:
     jump = float(stored["jump"])
     scene = replace(track.scene, contacts=[pair.repeated(jump) for pair in track.scene.contacts])
     state, cycles = track.problem.restore(stored, scene), float(stored["cycles"])
-    return Track(track.problem, scene, (state,), cycles, stored["volume"], int(stored["steps"]), jump)
+    volume, steps = stored["volume"], int(stored["steps"])
+    return Track(track.problem, scene, (state,), cycles, volume, steps, jump, before=(state,))

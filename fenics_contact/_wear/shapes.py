@@ -21,7 +21,7 @@ from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import vector_areas
-from fenics_contact.results.state import State
+from fenics_contact.results.deformed_state import AnyState
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Moved:
     """
 
     scene: Scene
-    before: State
+    before: AnyState
     volumes: Mapping[str, float]
     depth: np.ndarray
 
@@ -124,19 +124,20 @@ class WornShape:
         held[moving] = False
         return moving_with(self._decomposition, scene, name, moving, held)
 
-    def moved(self, scene: Scene, state: State) -> Moved:
+    def moved(self, scene: Scene, state: AnyState, kept: np.ndarray | float = 0.0) -> Moved:
         """Return a scene in its worn shape, and what its next load step goes on from. Collective.
 
         Args:
             scene: With the meshes of the state.
             state: At the end of a load step.
+            kept: Depth of its contact points that stays a gap since the shape followed before, (n_contact,).
 
         Raises:
             InvalidInputError: If depth that is not small is at nodes that supports hold, or cells would turn
                 inside out.
         """
         contact, tearing = state.contact, self._decomposition.tearing
-        depth, rest = contact.worn_depth, contact.worn_depth.copy()
+        depth, rest, earlier = contact.worn_depth - kept, contact.worn_depth, contact.worn_depth * 0.0 + kept
         vectors = {name: np.zeros_like(scene.bodies[name].mesh.points) for name in self._cut}
         volumes = dict.fromkeys(self._cut, 0.0)
         with together(self._decomposition.comm):
@@ -145,8 +146,9 @@ class WornShape:
                 nodes = slice(first, first + scene.bodies[side.body].mesh.n_nodes)
                 mine, weights = side.weights(contact.points, nodes)
                 lost = side.share * depth[mine]
-                stays = lost * (weights @ self._still[side.body].astype(float))
-                self._require_small(scene, side, stays / contact.points.sizes[mine])
+                held = weights @ self._still[side.body].astype(float)
+                stays, before = lost * held, held * earlier[mine] * scene.contacts[side.pair].between_bodies
+                self._require_small(scene, side, (stays + before) / contact.points.sizes[mine])
                 rest[mine] -= lost - stays
                 vector, volume = self._lost(scene, side, contact.points, lost, weights)
                 vectors[side.body] += vector
@@ -154,9 +156,9 @@ class WornShape:
         points = {name: self._points(scene, name, vectors[name], volumes[name]) for name in self._cut}
         with together(self._decomposition.comm):
             after = self._reshaped(scene, points)
-        before = replace(state, contact=replace(contact, worn=np.zeros_like(rest), worn_before=rest))
+        going_on = replace(state, contact=replace(contact, worn=np.zeros_like(rest), worn_before=rest))
         removed = {name: scene.bodies[name].volume - after.bodies[name].volume for name in self._cut}
-        return Moved(after, before, removed, depth - rest)
+        return Moved(after, going_on, removed, contact.worn_depth - rest)
 
     def _require_small(self, scene: Scene, side: _Side, stays: np.ndarray) -> None:
         """Reject depth at nodes that supports hold, relative to the size of facets."""
@@ -246,6 +248,43 @@ class WornShape:
                 after = keeping_discretisation(after)
                 after = replace(after, bodies={**after.bodies, name: replace(body, mesh=mesh)})
         return after
+
+
+class ShapeLost(InvalidInputError):
+    """The shape of a scene cannot follow its wear."""
+
+
+class Follower:
+    """Moves meshes where depth that is a gap exceeds a part of the size of facets.
+
+    `part`: the part, infinite for meshes that never move. Those of bodies that deform much do not.
+    """
+
+    def __init__(self, part: float) -> None:
+        self._part = part
+        self._shapes: list[WornShape] = []
+
+    def moved(
+        self, scene: Scene, decomposition: Decomposition, state: AnyState, kept: np.ndarray
+    ) -> tuple[Moved, ...]:
+        """Return the scene in its worn shape, none if it need not move. Collective; `kept`: as `WornShape`.
+
+        Raises:
+            ShapeLost: If the shape cannot follow.
+        """
+        share = np.zeros(len(scene.contacts))
+        for number, pair in enumerate(scene.contacts):
+            share[number] = sum(side.share for side in _Side.of(number, pair))
+        points = state.contact.points
+        depth = share[points.pair] * (state.contact.worn_depth - kept)
+        if scene.is_nonlinear or not (depth > self._part * points.sizes).any():
+            return ()
+        try:
+            if not self._shapes:
+                self._shapes.append(WornShape(scene, decomposition))
+            return (self._shapes[0].moved(scene, state, kept),)
+        except InvalidInputError as failure:
+            raise ShapeLost(f"the shape cannot follow: {failure}") from failure
 
 
 def _opposite(

@@ -10,7 +10,9 @@ import numpy as np
 from fenics_contact._equilibrium.other_rows import require_values_to_keep, with_kept
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import timed
+from fenics_contact._large_deformations.wear import AtNodes
 from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._wear.shapes import Follower
 from fenics_contact.errors import together
 from fenics_contact.feti.carried import same_contacts
 from fenics_contact.feti.torn import TornSystem
@@ -29,7 +31,9 @@ class Track:
     """A history of wear so far.
 
     `scene`: with its shape; `states`: the state at its end, none before the first step; `cycles`: done;
-    `volume`: lost by each pair; `steps`: solved; `jump`: cycles of the last ones.
+    `volume`: lost by each pair; `steps`: solved; `jump`: cycles of the last ones; `follower`: moves the
+    meshes; `before`: the state from which the next step goes on, the last one less what meshes have lost;
+    `gone`, `kept`: depth that they have lost so far, and that stays a gap.
     """
 
     problem: ContactProblem
@@ -39,6 +43,10 @@ class Track:
     volume: np.ndarray = field(default_factory=lambda: np.zeros(0))
     steps: int = 0
     jump: float = 1.0
+    follower: Follower = field(default_factory=lambda: Follower(np.inf))
+    before: tuple[AnyState, ...] = ()
+    gone: AtNodes = field(default_factory=AtNodes.none)
+    kept: AtNodes = field(default_factory=AtNodes.none)
 
     @property
     def state(self) -> AnyState:
@@ -49,7 +57,8 @@ class Track:
     @property
     def depth(self) -> np.ndarray:
         """Depth that points of the last state have lost, shape (n_contact,), [length]."""
-        return self.state.contact.worn_depth
+        (before,) = self.before
+        return self.gone.on(before.contact.points)[:, 0] + before.contact.worn_depth
 
     @property
     def pressure(self) -> float:
@@ -72,10 +81,20 @@ class Track:
         track = self
         for step in steps:
             track = track._after(replace(step, cycles=cycles))
-        return replace(track, cycles=self.cycles + cycles, jump=cycles)
+        return replace(track, cycles=self.cycles + cycles, jump=cycles)._followed()
+
+    def _followed(self) -> Track:
+        """Return the history with the meshes in their worn shape, where that differs enough. Collective."""
+        points, decomposition = self.state.contact.points, self.problem.decomposition
+        kept = self.kept.on(points)[:, 0]
+        for moved in self.follower.moved(self.scene, decomposition, self.state, kept):
+            gone = AtNodes.of(points, self.gone.on(points) + moved.depth[:, None])
+            rest = AtNodes.of(points, moved.before.contact.worn_depth[:, None])
+            return replace(self, scene=moved.scene, before=(moved.before,), gone=gone, kept=rest)
+        return self
 
     def _after(self, step: LoadStep) -> Track:
-        before = next(iter(self.states), None)
+        before = next(iter(self.before), None)
         with together(self.problem.comm):
             scene = step.applied_to(self.scene)
             require_values_to_keep(step, scene)
@@ -86,7 +105,9 @@ class Track:
         lost = contact.nominal_area * contact.worn
         volume = np.bincount(contact.points.pair, lost, minlength=len(scene.contacts))
         volume = volume + (self.volume if len(self.volume) else 0.0)
-        return replace(self, scene=scene, states=(state,), volume=volume, steps=self.steps + 1)
+        return replace(
+            self, scene=scene, states=(state,), before=(state,), volume=volume, steps=self.steps + 1
+        )
 
     def at_end_of(self, steps: Sequence[LoadStep]) -> Track:
         """Return the history of a scene as it is after steps, before any is solved."""

@@ -13,9 +13,11 @@ from mpi4py import MPI
 from fenics_contact import (
     ContactProblem,
     Coulomb,
+    RigidPlane,
     RigidSphere,
     Scene,
     Support,
+    wear_to,
 )
 from fenics_contact._wear.shapes import WornShape
 from fenics_contact.errors import InvalidInputError
@@ -158,6 +160,46 @@ def test_depth_stays_a_gap_where_supports_hold_nodes() -> None:
         InvalidInputError, match=r"nodes that wear must be free to move, but .* of body 'low' hold"
     ):
         WornShape(scene, problem.decomposition).moved(scene, deep)
+
+
+def test_depth_on_obstacles_is_taken_from_the_mesh_once() -> None:
+    scene = on_obstacle(RigidPlane((0.0, 0.0), (0.0, 1.0)), 0.5)
+    problem, _, moved = worn(scene)
+    shape = WornShape(scene, problem.decomposition)
+    kept = moved.before.contact.worn_depth
+    again = problem.solve(moved.scene, before=moved.before)
+    twice = shape.moved(moved.scene, again, kept)
+    assert twice.volumes["punch"] == pytest.approx(
+        0.5 * again.contact.nominal_area @ again.contact.worn, rel=1e-8
+    )
+    np.testing.assert_allclose(twice.before.contact.worn_depth, kept + 0.5 * again.contact.worn, rtol=1e-12)
+
+
+@pytest.mark.parametrize("scene", [blocks(0.5), tilted(None)], ids=["bodies", "obstacle"])
+def test_histories_whose_shape_follows_are_those_whose_gaps_do(scene: Scene) -> None:
+    problem = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-8)
+    gap, shape = (wear_to(problem, 2.0, tolerance=0.05, follow=follow) for follow in (np.inf, 2e-3))
+    assert gap.state.scene.points is not shape.state.scene.points
+    assert np.abs(gap.state.scene.points - shape.state.scene.points).max() > 1e-3
+    assert shape.state.contact.worn_depth.max() < 0.6 * shape.depth.max()
+    assert shape.volume == pytest.approx(gap.volume, rel=5e-3)
+    np.testing.assert_allclose(shape.depth, gap.depth, rtol=0.0, atol=5e-3 * gap.depth.max())
+
+
+def test_histories_end_where_their_shape_cannot_follow(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: Any) -> Any:
+        raise InvalidInputError("no such mesh")
+
+    scene = tilted(None)
+    problem = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-8)
+    monkeypatch.setattr(WornShape, "moved", fails)
+    history = wear_to(problem, 2.0, tolerance=0.05, follow=4e-3)
+    assert history.reason == "the shape cannot follow: no such mesh"
+    assert history.jumps[-1].cycles < 2.0
+    with pytest.raises(InvalidInputError, match="the shape cannot follow: no such mesh"):
+        wear_to(problem, 2.0, tolerance=0.05, follow=0.0)
+    with pytest.raises(InvalidInputError, match=r"follow must not be negative, got -1: give np\.inf"):
+        wear_to(problem, 2.0, follow=-1.0)
 
 
 ON_RANKS = """
