@@ -78,9 +78,9 @@ class WornShape:
     true shape. Depth stays a gap on obstacles, where pairs give their gaps, and at nodes that supports hold.
 
     Example:
-        >>> shape = WornShape(scene, problem.decomposition)  # doctest: +SKIP
-        >>> moved = shape.moved(scene, state)  # doctest: +SKIP
-        >>> problem.solve(moved.scene, before=moved.before)  # doctest: +SKIP
+        >>> equilibria = ContactProblem(scene, comm)  # doctest: +SKIP
+        >>> moved = WornShape(scene, equilibria.decomposition).moved(scene, state)  # doctest: +SKIP
+        >>> after = equilibria.solve(moved.scene, before=moved.before)  # doctest: +SKIP
     """
 
     #: Depth, relative to the size of facets, that may stay a gap at nodes that supports hold.
