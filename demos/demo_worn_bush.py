@@ -81,8 +81,8 @@ scene = Scene(
 problem = ContactProblem(scene, comm, tolerance=1e-8)
 new = problem.solve()
 with show_progress(comm):
-    worn = wear_to(problem, turns, tolerance=0.01)
-    thin = wear_to(scene, 1e6, comm, tolerance=0.01, limits=WearLimits(depth=0.1))
+    worn = wear_to(problem, turns, follow=0.2)
+    thin = wear_to(scene, 1e6, comm, follow=0.2, limits=WearLimits(depth=0.1))
 
 # ## The same by hand
 #

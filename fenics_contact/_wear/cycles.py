@@ -149,7 +149,7 @@ def wear_to(
     tolerance: float = 0.01,
     limits: WearLimits = WearLimits(),
     checkpoint: Checkpoint | None = None,
-    follow: float = 0.2,
+    follow: float = np.inf,
 ) -> WearHistory:
     """Follow wear over many cycles, in jumps whose error is estimated and kept small. Collective.
 
@@ -172,8 +172,9 @@ def wear_to(
         checkpoint: File that is written after each jump and from which an interrupted history goes on, also
             to more cycles or other limits, on any number of ranks.
         follow: Worn depth, relative to the size of facets, beyond which the meshes lose it and gaps are
-            those of the new shape, ≥ 0; before it is a gap. `np.inf`: it always is, as where bodies deform
-            much, and where pairs give their gaps. A history whose shape cannot follow ends, and says so.
+            those of the new shape, ≥ 0, such as 0.2; before it is a gap. By default it always is, as where
+            bodies deform much, and where pairs give their gaps. A history whose shape cannot follow ends, and
+            says so; on coarse meshes moves may err more than the tolerance.
 
     Raises:
         InvalidInputError: If no pair wears, nothing slides in a cycle, or an argument is outside its range.
@@ -203,8 +204,7 @@ def wear_to(
     if checkpoint is not None:
         if np.isfinite(follow):
             raise InvalidInputError(
-                f"checkpoints of wear do not keep shapes, got follow={follow:g}: give follow=np.inf, or "
-                "leave the checkpoint out"
+                f"checkpoints of wear do not keep shapes, got follow={follow:g}: leave out one of both"
             )
         every = (*first, *steps)
         kept = KeptInFile(checkpoint, problem, every, first=len(first), tolerance=tolerance)
@@ -222,6 +222,11 @@ class _Pair:
     #: First jump, smallest jump, and last one, relative to all cycles: a short one, since pressures where
     #: surfaces have just met are those of a jump and not of its end. Largest jump, relative to cycles done.
     begin, least, end, growth = 1e-3, 1e-9, 2e-2, 3.0
+    #: Part of an error to which a shorter jump must reduce it, and growth where it does not: what moves of
+    #: the shape err is not the jump's.
+    vain, retry = 0.9, 2.0
+    #: Error of the jump that was refused last, relative to the tolerance.
+    _refused = np.inf
 
     def __init__(
         self,
@@ -322,12 +327,14 @@ class _Pair:
         part = self._limits.part(last, found)
         if part < 0.99:
             return jump * max(part, 0.1)
-        if excess > 1.0 and found.errs_more_than(last):
+        if excess > 1.0 and found.errs_more_than(last) and excess < self.vain * self._refused:
+            self._refused = excess
             return jump * float(np.clip(0.8 / excess, 0.2, 0.7))
+        vain, self._refused = excess > 1.0, np.inf
         self._coarse, self._fine = coarse, fine
         self.jumps.append(found)
-        longer = jump * float(np.clip(0.8 / (excess or 1e-300), 0.3, 1.0 + self.growth))
-        return min(self._fine.cycles * self.growth, longer)
+        grown = self.retry if vain else float(np.clip(0.8 / (excess or 1e-300), 0.3, 1.0 + self.growth))
+        return min(self._fine.cycles * self.growth, jump * grown)
 
     def _require_wear(self, found: WearJump, track: Track, still: float = 1e-10) -> None:
         """Reject a cycle in which nothing slides; `still`: slip that is rounding, relative to all bodies."""

@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import ContactProblem, Coulomb, RigidSurface, Scene, State, Status, Support
-from fenics_contact.design import FrictionWork, Partials, sensitivity
+from fenics_contact.design import FrictionWork, Partials
 from tests.design.aims import aims
 from tests.design.blocks import block_on_block, designs_of, problem
 from tests.design.chains import SOLVER
@@ -62,12 +62,12 @@ def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) 
 def test_the_work_of_the_load_at_the_point_counts(name: str, monkeypatch: Patch) -> None:
     judge = OBJECTIVES["energy"]
     here = Line(line(name).problem, line(name).alpha + 1e-7, line(name).direction, 1e-5)
-    whole = sensitivity.solve_adjoint  # type: ignore[attr-defined]
+    whole = couplings.solve_adjoint  # type: ignore[attr-defined]
 
     def without_points(state: State, partials: Partials, *more: Any, **named: Any) -> Any:
         return whole(state, replace(partials, by_motion=0.0), *more, **named)
 
-    monkeypatch.setattr(sensitivity, "solve_adjoint", without_points)
+    monkeypatch.setattr(couplings, "solve_adjoint", without_points)
     assert here.miss(judge) > 1e-3
 
 
