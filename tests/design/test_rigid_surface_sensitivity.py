@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import ContactProblem, Coulomb, RigidSurface, Scene, State, Status, Support
-from fenics_contact.design import FrictionWork, Partials
+from fenics_contact.design import FrictionWork, Partials, couplings
 from tests.design.aims import aims
 from tests.design.blocks import block_on_block, designs_of, problem
 from tests.design.chains import SOLVER
