@@ -12,11 +12,11 @@ from fenics_contact._base.display import counted
 from fenics_contact._equilibrium.passes import OuterLoop, Passes
 from fenics_contact._large_deformations.load_steps import AutomaticSteps
 from fenics_contact._large_deformations.moving_contact import Contact
-from fenics_contact._large_deformations.wear import AtNodes, EarlierWear
+from fenics_contact._large_deformations.wear import EarlierWear
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.feti.carried import same_contacts
-from fenics_contact.feti.point_wear import PointWear, WornClosures
+from fenics_contact.feti.point_wear import AtNodes, PointWear, WornClosures
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
@@ -92,23 +92,26 @@ class Wearing(OuterLoop):
                 "wear is that of whole load steps, got AutomaticSteps with finer_history or snaps: leave "
                 "them out, and give more load steps"
             )
-        contact.wear = EarlierWear.of(() if before is None else (before.contact,))
+        contact.wear = EarlierWear.of(() if before is None else (before,))
 
     def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
         """Return what points had lost, and their distances."""
         closures = cast(WornClosures, torn.groups.normal.closures)
-        key = np.stack([torn.points.pair, torn.points.slave])
-        return {"lost": np.asarray(torn.wear.before), "lost_at": key, "distance": closures.distance}
+        wear, points = cast(PointWear, torn.wear), torn.points
+        lost = wear.lost.updated(points, wear.before[:, None])
+        known = {"lost": lost.values, "lost_at": lost.key, "distance": closures.distance}
+        return {**known, "slid_at": AtNodes.of(points, wear.before).key}
 
     def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
         """Return the system with the wear as it was. Collective."""
-        wear = PointWear.of(torn.scene, torn.points, stored["lost"], torn.decomposition.comm)
+        lost = AtNodes(stored["lost_at"], stored["lost"]).on(torn.points)[:, 0]
+        wear = PointWear.of(torn.scene, torn.points, lost, torn.decomposition.comm)
         return wear.on(torn, stored["distance"])
 
     def follow_stored(self, contact: Contact, stored: Mapping[str, np.ndarray]) -> None:
         """Let contact begin with what a stored state had lost before its load step."""
-        at, depth = stored["lost_at"], stored["lost"][:, None]
-        contact.wear = EarlierWear(AtNodes(at, depth), AtNodes(at, stored["slip"][0]))
+        lost = AtNodes(stored["lost_at"], stored["lost"])
+        contact.wear = EarlierWear(lost, AtNodes(stored["slid_at"], stored["slip"][0]))
 
 
 def lost(torn: TornSystem, before: State | None) -> np.ndarray:

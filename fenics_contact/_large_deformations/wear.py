@@ -10,35 +10,7 @@ import numpy as np
 
 from fenics_contact._large_deformations.moving_contact import MovedContact, NoEarlierWear
 from fenics_contact._large_deformations.newton import NonlinearEquilibrium
-from fenics_contact._pairing.points import ContactPoints
-from fenics_contact.feti.point_wear import PointWear, WornClosures
-
-
-@dataclass(frozen=True, eq=False)
-class AtNodes:
-    """Values by pair and slave node; `key`: both, shape (2, n); `values`: shape (n, k)."""
-
-    key: np.ndarray
-    values: np.ndarray
-
-    @classmethod
-    def of(cls, points: ContactPoints, values: np.ndarray) -> AtNodes:
-        """Return the values at contact points."""
-        return cls(np.stack([points.pair, points.slave]), values)
-
-    @classmethod
-    def none(cls) -> AtNodes:
-        """Return no values."""
-        return cls(np.zeros((2, 0), dtype=np.int64), np.zeros((0, 1)))
-
-    def on(self, points: ContactPoints) -> np.ndarray:
-        """Return the values at other points, zero where there is none, shape (n_points, k)."""
-        width = 1 + int(max(self.key[1].max(initial=0), points.slave.max(initial=0)))
-        known, now = self.key[0] * width + self.key[1], points.pair * width + points.slave
-        _, there, here = np.intersect1d(known, now, return_indices=True)
-        found = np.zeros((points.count, self.values.shape[1]))
-        found[here] = self.values[there]
-        return found
+from fenics_contact.feti.point_wear import AtNodes, PointWear, WornClosures
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +27,24 @@ class EarlierWear(NoEarlierWear):
 
     @classmethod
     def of(cls, before: Sequence[Any]) -> EarlierWear:
-        """Return that of the contact at the end of the load step before, if there is one."""
+        """Return that of the state at the end of the load step before, if there is one.
+
+        Nodes that have left the master keep what they have lost until they come back.
+        """
         lost = slip = AtNodes.none()
-        for contact in before:
-            lost, slip = (AtNodes.of(contact.points, x) for x in (contact.worn_depth[:, None], contact.slip))
+        for state in before:
+            contact, points = state.contact, state.contact.points
+            if contact.worn_depth.any():
+                lost = cast(PointWear, state.torn.wear).lost
+            lost = lost.updated(points, contact.worn_depth[:, None])
+            slip = AtNodes.of(points, contact.slip)
         return cls(lost, slip)
 
     def on(self, contact: MovedContact) -> MovedContact:
         """Return contact that has lost this, and loses more over the slip."""
         torn, points = contact.torn, contact.torn.points
         before = self.lost.on(points)[:, 0]
-        wear = PointWear.of(torn.scene, points, before, torn.decomposition.comm)
+        wear = replace(PointWear.of(torn.scene, points, before, torn.decomposition.comm), lost=self.lost)
         return replace(contact, torn=wear.on(torn, wear.distance(self.slip.on(points))))
 
     def after(self, found: NonlinearEquilibrium, tolerance: float) -> EarlierWear:

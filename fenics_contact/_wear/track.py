@@ -10,11 +10,11 @@ import numpy as np
 from fenics_contact._equilibrium.other_rows import require_values_to_keep, with_kept
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import timed
-from fenics_contact._large_deformations.wear import AtNodes
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._wear.shapes import Follower
 from fenics_contact.errors import together
 from fenics_contact.feti.carried import same_contacts
+from fenics_contact.feti.point_wear import AtNodes
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.state import State

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,17 +18,60 @@ from fenics_contact.qp.compliance import Closures
 
 
 @dataclass(frozen=True, eq=False)
+class AtNodes:
+    """Values by pair and slave node; `key`: both, shape (2, n); `values`: shape (n, k)."""
+
+    key: np.ndarray
+    values: np.ndarray
+
+    @classmethod
+    def of(cls, points: ContactPoints, values: np.ndarray) -> AtNodes:
+        """Return the values at contact points."""
+        return cls(np.stack([points.pair, points.slave]), values)
+
+    @classmethod
+    def none(cls) -> AtNodes:
+        """Return no values."""
+        return cls(np.zeros((2, 0), dtype=np.int64), np.zeros((0, 1)))
+
+    def on(self, points: ContactPoints) -> np.ndarray:
+        """Return the values at other points, zero where there is none, shape (n_points, k)."""
+        width = 1 + int(max(self.key[1].max(initial=0), points.slave.max(initial=0)))
+        known, now = self.key[0] * width + self.key[1], points.pair * width + points.slave
+        _, there, here = np.intersect1d(known, now, return_indices=True)
+        found = np.zeros((points.count, self.values.shape[1]))
+        found[here] = self.values[there]
+        return found
+
+    def updated(self, points: ContactPoints, values: np.ndarray) -> AtNodes:
+        """Return these with other values at some points, (n_points, k)."""
+        now = AtNodes.of(points, values)
+        old = ~now._has(self.key)
+        return AtNodes(
+            np.concatenate([self.key[:, old], now.key], axis=1),
+            np.concatenate([self.values[old], values]) if old.any() else values,
+        )
+
+    def _has(self, key: np.ndarray) -> np.ndarray:
+        """Return which of other keys are among these, shape (n,)."""
+        width = 1 + int(max(self.key[1].max(initial=0), key[1].max(initial=0)))
+        return np.isin(key[0] * width + key[1], self.key[0] * width + self.key[1])
+
+
+@dataclass(frozen=True, eq=False)
 class PointWear(Unworn):
     """Wear of the points of pairs, replicated.
 
     `pairs`: for each law the numbers of its points; `factor`: by which distance and curve are multiplied,
-    (n_contact,); `places`: of slave nodes, (n_contact, dim).
+    (n_contact,); `places`: of slave nodes, (n_contact, dim); `lost`: what all nodes had lost that there ever
+    were points at, where bodies move far.
     """
 
     laws: Sequence[tuple[str, Wear, np.ndarray]]
     factor: np.ndarray
     places: np.ndarray
     before: np.ndarray
+    lost: AtNodes = field(default_factory=lambda: AtNodes.none())
 
     @classmethod
     def of(cls, scene: Scene, points: ContactPoints, before: np.ndarray, comm: MPI.Comm) -> PointWear:

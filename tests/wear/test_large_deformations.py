@@ -11,15 +11,21 @@ from mpi4py import MPI
 
 from fenics_contact import (
     AutomaticSteps,
+    Body,
+    ContactPair,
     ContactProblem,
+    Coulomb,
     LoadStep,
     Scene,
     State,
+    Support,
+    Surface,
     Wear,
     solve_steps,
 )
 from fenics_contact._equilibrium.steps import stored_state
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import rectangle
 from fenics_contact.materials import J2Plasticity, NeoHooke, PlaneStrain
 from tests.wear.pressed import pressed
 
@@ -90,3 +96,30 @@ def test_what_would_forget_its_wear_is_refused() -> None:
     body = replace(scene.bodies["punch"], material=J2Plasticity(2000.0, 0.3, 5.0))
     with pytest.raises(InvalidInputError, match="wear needs linear materials or large deformations"):
         replace(scene, bodies={"punch": body})
+
+
+def test_nodes_that_leave_the_master_keep_what_they_have_lost() -> None:
+    soft = NeoHooke(1000.0, 0.3)
+    bodies = {
+        "upper": Body(rectangle((0.0, 0.0), (2.0, 1.0), (4, 2)), soft),
+        "lower": Body(rectangle((0.0, -1.0), (3.0, 0.0), (5, 2)), soft),
+    }
+
+    def moved(x: float) -> list[Support]:
+        return [Support("lower", "y0"), Support("upper", "y1", (x, -0.02))]
+
+    sides = Surface("upper", "y0"), Surface("lower", "y1")
+    pair = ContactPair(*sides, Coulomb(0.1), "node", wear=Wear(1e-4))
+    scene = Scene(bodies, moved(0.0), contacts=[pair])
+    on, off, back = after(scene, [LoadStep(f"to {x}", supports=moved(x)) for x in (0.6, 2.0, 1.9)])
+    assert off.contact.points.count < on.contact.points.count
+    lost = dict(zip(on.contact.points.slave, on.contact.worn_depth, strict=True))
+    gone = np.setdiff1d(on.contact.points.slave, off.contact.points.slave)
+    problem = ContactProblem.following(off, tolerance=1e-9)
+    again = problem.restore(stored_state(off), off.scene)
+    for state in (back, problem.solve(back.scene, before=again)):
+        home = problem.solve(replace(scene, supports=moved(0.6)), before=state)
+        contact = home.contact
+        for node in gone:
+            depth = contact.worn_depth[contact.points.slave == node]
+            assert depth.min() >= lost[node] * (1.0 - 1e-6)
