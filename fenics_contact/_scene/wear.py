@@ -161,7 +161,7 @@ class _Power(WearCurve):
 @dataclass(frozen=True)
 @checked()
 class Wear:
-    """Archard's law: a contact loses the depth k p |Δs| where it slides by Δs under the pressure p.
+    """Archard's law: a contact loses the depth k p Δs where it slides by Δs under the pressure p.
 
     The depth is that of one implicit step: the pressure is the one at the end of the load step, which the
     loss has changed, so that steps may be as long as one likes; how much they err is what `wear_to` controls.
