@@ -33,7 +33,7 @@ from fenics_contact.qp.in_turn import InTurn
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.contact import no_contact
-from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
+from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual, worn_by
 from fenics_contact.results.linear_state import DirectState, LinearState
 from fenics_contact.results.state import State, Tolerance, compute_energies
 
@@ -178,7 +178,7 @@ class LinearEquilibria:
         with self._timer.phase("state"):
             if displacement is None:
                 displacement = system.displacement(solution.multiplier, solution.alpha)
-            contact = contact_result(torn, row_values(system, solution), displacement)
+            contact = worn_by(contact_result(torn, row_values(system, solution), displacement), torn)
             friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
             rigid = system.kernel @ solution.alpha
             energies = compute_energies(torn, displacement, solution.multiplier, friction, rigid)

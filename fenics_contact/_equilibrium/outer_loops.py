@@ -23,7 +23,7 @@ def outer_loops(scene: Scene) -> list[OuterLoop]:
         from fenics_contact._equilibrium.slip_dependence import FrictionBySlip
 
         loops.append(FrictionBySlip())
-    if any(pair.wears for pair in scene.contacts):
+    if scene.wears:
         from fenics_contact._equilibrium.wearing import Wearing
 
         loops.append(Wearing())

@@ -70,6 +70,30 @@ class Passes:
         return replace(state, solution=found)
 
 
+class Relaxation:
+    """The part θ of a change that the next pass takes over.
+
+    All of it at first, then what the last two changes r ask for, θ ← −θ r₀·(r₁ − r₀) / ‖r₁ − r₀‖².
+
+    References:
+        U. Küttler, W. A. Wall, Fixed-point fluid–structure interaction solvers with dynamic relaxation,
+        Comput. Mech. 43 (2008) 61–72.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a change."""
+        self._part, self._last = 1.0, np.zeros(0)
+
+    def of(self, change: np.ndarray) -> float:
+        """Return the part of the next change, shape (n,)."""
+        if len(self._last):
+            turn = change - self._last
+            part = -self._part * float(self._last @ turn) / (float(turn @ turn) or 1.0)
+            self._part = part if part > 0.0 else 1.0
+        self._last = change
+        return self._part
+
+
 class OuterLoop(ABC):
     """An iteration around the dual solver; every pass of it is a solution."""
 

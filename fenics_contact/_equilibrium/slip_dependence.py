@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenics_contact._base.display import counted
-from fenics_contact._equilibrium.passes import OuterLoop, Passes
+from fenics_contact._equilibrium.passes import OuterLoop, Passes, Relaxation
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.linear_state import LinearState
@@ -48,24 +48,20 @@ class FrictionBySlip(OuterLoop):
     def solve(self, passes: Passes, torn: TornSystem, before: State | None, tolerance: float) -> LinearState:
         """Return the state whose friction coefficients are those of its slips. Collective.
 
-        Every pass is one solution at given coefficients, of whose change the next takes over a part θ: all of
-        it at first, then what the last two changes r ask for, θ ← −θ r₀·(r₁ − r₀) / ‖r₁ − r₀‖². It is less
-        than one where they alternate, as friction that rises steeply makes them, and more where they only get
-        smaller. Where friction falls faster with the slip than bodies are stiff, changes grow in one
-        direction: θ = 1 follows them to where it falls no more. There may be several states, or none.
+        Every pass is one solution at given coefficients, of whose change the next takes over a part,
+        see `Relaxation`: less than all where changes alternate, as friction that rises steeply makes them,
+        and more where they only get smaller. Where friction falls faster with the slip than bodies are
+        stiff, changes grow in one direction: θ = 1 follows them to where it falls no more. There may be
+        several states, or none.
 
         The tolerance is the largest change of a slip bound relative to the largest. That of passes is
         smaller: their errors must not pass for changes of friction.
-
-        References:
-            U. Küttler, W. A. Wall, Fixed-point fluid–structure interaction solvers with dynamic relaxation,
-            Comput. Mech. 43 (2008) 61–72.
         """
         slip = np.zeros((torn.points.count, torn.components - 1))
         latest = passes.latest
         if latest is not None and latest.contact.total_slip.shape == slip.shape:
             slip = latest.contact.total_slip
-        mu, part, last = coefficients(torn, slip), 1.0, np.zeros(0)
+        mu, relaxation = coefficients(torn, slip), Relaxation()
         while passes.count < self.max_passes:
             state = passes.run(with_coefficients(torn, mu), min(tolerance, max(0.1 * tolerance, 1e-10)))
             contact = state.contact
@@ -77,11 +73,7 @@ class FrictionBySlip(OuterLoop):
             passes.remark(f"slip pass {passes.count}: slip bounds changed by {change:.1e}")
             if change <= tolerance:
                 return passes.answer(state)
-            if len(last):
-                turn = missing - last
-                part *= -float(last @ turn) / (float(turn @ turn) or 1.0)
-                part = part if part > 0.0 else 1.0
-            mu, last = np.maximum(mu + part * (target - mu), 0.0), missing
+            mu = np.maximum(mu + relaxation.of(missing) * (target - mu), 0.0)
         after = counted(passes.count, "pass", "passes")
         raise ConvergenceError(
             f"friction coefficients must agree with the slips, after {after} slip bounds still change by "

@@ -9,13 +9,13 @@ from typing import cast
 import numpy as np
 
 from fenics_contact._base.display import counted
-from fenics_contact._equilibrium.passes import OuterLoop, Passes
+from fenics_contact._equilibrium.passes import OuterLoop, Passes, Relaxation
 from fenics_contact._large_deformations.load_steps import AutomaticSteps
 from fenics_contact._large_deformations.moving_contact import Contact
 from fenics_contact._large_deformations.wear import EarlierWear
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.feti.carried import same_contacts
+from fenics_contact.feti.carried import on_contacts
 from fenics_contact.feti.point_wear import AtNodes, PointWear, WornClosures
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.linear_state import LinearState
@@ -52,9 +52,8 @@ class Wearing(OuterLoop):
         difference, as `FrictionBySlip` does; the first one need not be accurate. The tolerance is that of the
         forces by which the wear of the distances that were and of those that are differ, relative to all.
         """
-        wear = PointWear.of(torn.scene, torn.points, lost(torn, before), torn.decomposition.comm)
-        slip = on_points(torn, passes.latest, "slip") * np.ones((1, torn.components - 1))
-        distance, part, last = wear.distance(slip), 1.0, np.zeros(0)
+        wear = PointWear.of(torn.scene, torn.points, _lost(torn, before), torn.decomposition.comm)
+        distance, relaxation = wear.distance(_slip(torn, passes.latest)), Relaxation()
         guessed = passes.latest is not None or not wear.by_slip
         accuracy = tolerance if guessed else max(tolerance, self.rough)
         while passes.count < self.max_passes:
@@ -68,12 +67,8 @@ class Wearing(OuterLoop):
                 continue
             if change <= tolerance:
                 return passes.answer(state)
-            weighted = missing * state.contact.normal_force
-            if len(last):
-                turn = weighted - last
-                part *= -float(last @ turn) / (float(turn @ turn) or 1.0)
-                part = part if part > 0.0 else 1.0
-            distance, last = np.maximum(distance + part * missing, 0.0), weighted
+            part = relaxation.of(missing * state.contact.normal_force)
+            distance = np.maximum(distance + part * missing, 0.0)
         after = counted(passes.count, "pass", "passes")
         raise ConvergenceError(
             f"wear must agree with the slips, after {after} it still changes forces by {change:.1e} of the "
@@ -104,30 +99,28 @@ class Wearing(OuterLoop):
 
     def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
         """Return the system with the wear as it was. Collective."""
-        lost = AtNodes(stored["lost_at"], stored["lost"]).on(torn.points)[:, 0]
+        lost = AtNodes.keyed(stored["lost_at"], stored["lost"]).on(torn.points)[:, 0]
         wear = PointWear.of(torn.scene, torn.points, lost, torn.decomposition.comm)
         return wear.on(torn, stored["distance"])
 
     def follow_stored(self, contact: Contact, stored: Mapping[str, np.ndarray]) -> None:
         """Let contact begin with what a stored state had lost before its load step."""
-        lost = AtNodes(stored["lost_at"], stored["lost"])
-        contact.wear = EarlierWear(lost, AtNodes(stored["slid_at"], stored["slip"][0]))
+        lost = AtNodes.keyed(stored["lost_at"], stored["lost"])
+        contact.wear = EarlierWear(lost, AtNodes.keyed(stored["slid_at"], stored["slip"][0]))
 
 
-def lost(torn: TornSystem, before: State | None) -> np.ndarray:
+def _lost(torn: TornSystem, before: State | None) -> np.ndarray:
     """Return the depth that points of a system have lost in a state before, (n_contact,), [length]."""
-    return np.ravel(on_points(torn, before, "worn_depth") * np.ones((1, 1)))
+    if before is None:
+        return np.zeros(torn.points.count)
+    return on_contacts(before.torn, before.contact.worn_depth, torn)
 
 
-def on_points(torn: TornSystem, state: State | None, name: str) -> np.ndarray:
-    """Return a part of the result of contact at the points of a system, zero at others, (n_contact, k)."""
-    if state is None:
-        return np.zeros((torn.points.count, 1))
-    values = getattr(state.contact, name).reshape(state.contact.points.count, -1)
-    match = same_contacts(state.torn, torn)
-    found = np.zeros((torn.points.count, values.shape[1]))
-    found[match >= 0] = values[match[match >= 0]]
-    return found
+def _slip(torn: TornSystem, latest: State | None) -> np.ndarray:
+    """Return the slips of the latest state at points of a system, (n_contact, dim − 1), [length]."""
+    if latest is None:
+        return np.zeros((torn.points.count, torn.components - 1))
+    return on_contacts(latest.torn, latest.contact.slip, torn)
 
 
 def _in_forces(state: LinearState, wear: PointWear, missing: np.ndarray) -> float:

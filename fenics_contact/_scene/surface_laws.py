@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -62,9 +63,50 @@ class FrictionCurve(ABC):
         """
 
 
+class ByPressure:
+    """A coefficient c(p) between values at pressures, and its product with the pressure, which must not fall.
+
+    Attributes:
+        symbol: What c is called in messages.
+        remedy: What to do about a product that falls.
+    """
+
+    symbol: ClassVar[str]
+    remedy: ClassVar[str]
+    pressure: Sequence[float]
+    coefficient: Sequence[float]
+
+    def __post_init__(self) -> None:
+        """Reject incomplete tables, and products that fall."""
+        name, c = type(self).__name__, self.symbol
+        p, values = self._values
+        require_table(name, "pressures", p, values)
+        ends = values[1:] + np.diff(values) / np.diff(p) * p[1:]
+        if (ends < 0).any():
+            worst = int(np.argmin(ends))
+            raise InvalidInputError(
+                f"{c}(p) p of a {name} must not fall, got {c} = {values[worst]:g} at p = {p[worst]:g} and "
+                f"{values[worst + 1]:g} at {p[worst + 1]:g}: {self.remedy}"
+            )
+
+    @property
+    def _values(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.pressure, dtype=np.float64), np.array(self.coefficient, dtype=np.float64)
+
+    def product(self, pressure: np.ndarray) -> np.ndarray:
+        """Return c(p) p, shape (n,)."""
+        return np.asarray(np.interp(pressure, *self._values) * pressure)
+
+    def growth(self, pressure: np.ndarray) -> np.ndarray:
+        """Return c + p dc/dp, the derivative of the product, shape (n,)."""
+        p, c = self._values
+        slope = np.concatenate([[0.0], np.diff(c) / np.diff(p), [0.0]])
+        return np.asarray(np.interp(pressure, p, c) + slope[np.searchsorted(p, pressure)] * pressure)
+
+
 @dataclass(frozen=True)
 @checked()
-class FrictionTable(FrictionCurve):
+class FrictionTable(ByPressure, FrictionCurve):
     """A friction coefficient that depends on the pressure: linear between values, constant beyond the ends.
 
     Attributes:
@@ -80,24 +122,10 @@ class FrictionTable(FrictionCurve):
         array([12.5])
     """
 
+    symbol = "μ"
+    remedy = "spread its fall, or give Coulomb a shear_limit"
     pressure: Sequence[float]
     coefficient: Sequence[float]
-
-    def __post_init__(self) -> None:
-        """Reject incomplete tables, and strengths that fall."""
-        p, mu = self._values
-        require_table("FrictionTable", "pressures", p, mu)
-        ends = mu[1:] + np.diff(mu) / np.diff(p) * p[1:]
-        if (ends < 0).any():
-            worst = int(np.argmin(ends))
-            raise InvalidInputError(
-                f"μ(p) p of a FrictionTable must not fall, got μ = {mu[worst]:g} at p = {p[worst]:g} and "
-                f"{mu[worst + 1]:g} at {p[worst + 1]:g}: spread its fall, or give Coulomb a shear_limit"
-            )
-
-    @property
-    def _values(self) -> tuple[np.ndarray, np.ndarray]:
-        return np.array(self.pressure, dtype=np.float64), np.array(self.coefficient, dtype=np.float64)
 
     @property
     def largest_coefficient(self) -> float:  # type: ignore[override]
@@ -106,13 +134,7 @@ class FrictionTable(FrictionCurve):
 
     def strength(self, pressure: np.ndarray) -> np.ndarray:
         """Return μ(p) p, see `FrictionCurve.strength`."""
-        return np.asarray(np.interp(pressure, *self._values) * pressure)
-
-    def growth(self, pressure: np.ndarray) -> np.ndarray:
-        """Return μ + p dμ/dp, see `FrictionCurve.growth`."""
-        p, mu = self._values
-        slope = np.concatenate([[0.0], np.diff(mu) / np.diff(p), [0.0]])
-        return np.asarray(np.interp(pressure, p, mu) + slope[np.searchsorted(p, pressure)] * pressure)
+        return self.product(pressure)
 
 
 @dataclass(frozen=True)
@@ -184,22 +206,33 @@ def require_finite(name: str, p: np.ndarray, values: Sequence[np.ndarray]) -> No
         )
 
 
-def check_rising(curve: FrictionCurve, decades: int = 12) -> None:
-    """Reject a curve that falls, or starts above zero; pressures of ``decades`` above and below one."""
+def rising(curve: Any, of: str, what: str, law: str, decades: int = 12) -> tuple[np.ndarray, np.ndarray]:
+    """Return pressures of ``decades`` above and below one, and values of a curve there, which must not fall.
+
+    `of`: name of the method that returns them, beside ``growth``; `what`, `law`: both in words.
+    """
     p = np.concatenate([[0.0], np.logspace(-decades, decades, 40 * decades + 1)])
     name = type(curve).__name__
-    with user_code(f"{name} as a law of friction"):
-        values = [np.asarray(each(p), dtype=np.float64) for each in (curve.strength, curve.growth)]
-        largest = float(curve.largest_coefficient)
-    require_finite(f"strength and growth of {name}", p, values)
-    strength, growth = values
-    wrong = np.flatnonzero((np.diff(strength) < -1e-12 * strength[1:]) | (growth[1:] < 0))
-    if strength[0] != 0.0 or len(wrong):
-        at = p[wrong[0] + 1] if len(wrong) else 0.0
+    with user_code(f"{name} as a law of {law}"):
+        values = [np.asarray(each(p), dtype=np.float64) for each in (getattr(curve, of), curve.growth)]
+    require_finite(f"{of} and growth of {name}", p, values)
+    found, growth = values
+    wrong = np.flatnonzero((np.diff(found) < -1e-12 * found[1:]) | (growth[1:] < 0))
+    if found[0] != 0.0 or len(wrong):
+        at = int(wrong[0]) + 1 if len(wrong) else 0
         raise InvalidInputError(
-            f"the friction traction of {name} must be zero without pressure and must not fall, got "
-            f"{np.interp(at, p, strength):g} at the pressure {at:g}: keep it there for a unique answer"
+            f"the {what} of {name} must be zero without pressure and must not fall, got {found[at]:g} at the "
+            f"pressure {p[at]:g}: keep it there for a unique answer"
         )
+    return p, found
+
+
+def check_rising(curve: FrictionCurve) -> None:
+    """Reject a curve that falls, or starts above zero, and one with a wrong `largest_coefficient`."""
+    p, strength = rising(curve, "strength", "friction traction", "friction")
+    name = type(curve).__name__
+    with user_code(f"{name} as a law of friction"):
+        largest = float(curve.largest_coefficient)
     if (strength > largest * p * (1.0 + 1e-9)).any():
         raise InvalidInputError(
             f"largest_coefficient of {name} must be at least strength / pressure everywhere, got {largest:g} "

@@ -12,9 +12,8 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.checks import check_not_negative, check_positive
 from fenics_contact._scene.fields import OfPosition, gradients_of, not_negative
-from fenics_contact._scene.surface_laws import integral_from_zero, require_finite, require_table
+from fenics_contact._scene.surface_laws import ByPressure, integral_from_zero, rising
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.kinds import user_code
 
 if TYPE_CHECKING:
     from fenics_contact._scene.part import Around
@@ -77,7 +76,7 @@ class WearCurve(ABC):
 
 @dataclass(frozen=True)
 @checked()
-class WearTable(WearCurve):
+class WearTable(ByPressure, WearCurve):
     """A wear coefficient that depends on the pressure: linear between values, constant beyond the ends.
 
     Attributes:
@@ -93,49 +92,14 @@ class WearTable(WearCurve):
         array([1.e-06])
     """
 
+    symbol = "k"
+    remedy = "spread its fall"
     pressure: Sequence[float]
     coefficient: Sequence[float]
 
-    def __post_init__(self) -> None:
-        """Reject incomplete tables, and rates that fall."""
-        p, k = self._values
-        require_table("WearTable", "pressures", p, k)
-        ends = k[1:] + np.diff(k) / np.diff(p) * p[1:]
-        if (ends < 0).any():
-            worst = int(np.argmin(ends))
-            raise InvalidInputError(
-                f"k(p) p of a WearTable must not fall, got k = {k[worst]:g} at p = {p[worst]:g} and "
-                f"{k[worst + 1]:g} at {p[worst + 1]:g}: spread its fall"
-            )
-
-    @property
-    def _values(self) -> tuple[np.ndarray, np.ndarray]:
-        return np.array(self.pressure, dtype=np.float64), np.array(self.coefficient, dtype=np.float64)
-
     def rate(self, pressure: np.ndarray) -> np.ndarray:
         """Return k(p) p, see `WearCurve.rate`."""
-        return np.asarray(np.interp(pressure, *self._values) * pressure)
-
-    def growth(self, pressure: np.ndarray) -> np.ndarray:
-        """Return k + p dk/dp, see `WearCurve.growth`."""
-        p, k = self._values
-        slope = np.concatenate([[0.0], np.diff(k) / np.diff(p), [0.0]])
-        return np.asarray(np.interp(pressure, p, k) + slope[np.searchsorted(p, pressure)] * pressure)
-
-
-def check_rates(curve: WearCurve, decades: int = 12) -> None:
-    """Reject a curve that falls, or starts above zero; pressures of ``decades`` above and below one."""
-    p, name = np.concatenate([[0.0], np.logspace(-decades, decades, 40 * decades + 1)]), type(curve).__name__
-    with user_code(f"{name} as a law of wear"):
-        rate, growth = (np.asarray(each(p), dtype=np.float64) for each in (curve.rate, curve.growth))
-    require_finite(f"rate and growth of {name}", p, (rate, growth))
-    wrong = np.flatnonzero((np.diff(rate) < -1e-12 * rate[1:]) | (growth[1:] < 0))
-    if rate[0] != 0.0 or len(wrong):
-        at = int(wrong[0]) + 1 if len(wrong) else 0
-        raise InvalidInputError(
-            f"the wear of {name} must be zero without pressure and must not fall, got {rate[at]:g} at the "
-            f"pressure {p[at]:g}: keep it there for a unique answer"
-        )
+        return self.product(pressure)
 
 
 @dataclass(frozen=True)
@@ -206,7 +170,7 @@ class Wear:
         """Refuse what cannot be a law."""
         remedy = "give the depth per pressure and sliding distance, such as 1e-7 mm²/N; omit wear for none"
         if isinstance(self.coefficient, WearCurve):
-            check_rates(self.coefficient)
+            rising(self.coefficient, "rate", "wear", "wear")
             if (self.exponent, self.least_pressure) != (1.0, 0.0):
                 raise InvalidInputError(
                     f"Wear by a curve has no exponent and no least pressure, got {self.exponent:g} and "

@@ -194,7 +194,7 @@ def wear_to(
         check_positive("cycles", cycles, "give how often the steps are repeated")
         if not 0.0 < tolerance < 1.0:
             raise InvalidInputError(f"tolerance must lie between 0 and 1, got {tolerance:g}: give 0.01")
-        if not any(pair.wears for pair in problem.scene.contacts):
+        if not problem.scene.wears:
             raise InvalidInputError(
                 "wear_to needs a pair that wears, got none: give ContactPair(wear=Wear(k))"
             )

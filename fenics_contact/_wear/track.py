@@ -13,17 +13,9 @@ from fenics_contact._equilibrium.steps import timed
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._wear.shapes import Follower
 from fenics_contact.errors import together
-from fenics_contact.feti.carried import same_contacts
+from fenics_contact.feti.carried import on_contacts
 from fenics_contact.feti.point_wear import AtNodes
-from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.deformed_state import AnyState
-from fenics_contact.results.state import State
-
-
-def on_points_of(torn: TornSystem, state: State, values: np.ndarray) -> np.ndarray:
-    """Return values at the contact points of a state at those of a system, zero at others, (n_contact,)."""
-    match = same_contacts(state.torn, torn)
-    return np.where(match >= 0, values[match], 0.0) if len(values) else np.zeros(torn.points.count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,4 +114,4 @@ class Track:
 
     def depth_at(self, other: Track) -> np.ndarray:
         """Return the depths at the contact points of another history, shape (n_contact,), [length]."""
-        return on_points_of(other.state.torn, self.state, self.depth)
+        return on_contacts(self.state.torn, self.depth, other.state.torn)

@@ -20,7 +20,7 @@ def couplings_of(state: LinearState, linearised: LinearisedFace) -> list[Couplin
         from fenics_contact.design.slip_friction import SlipFriction
 
         found.append(SlipFriction.of(state, linearised))
-    if any(pair.wears for pair in state.scene.contacts):
+    if state.scene.wears:
         from fenics_contact.design.wear_derivatives import WearBySlip
 
         found.append(WearBySlip.of(state))

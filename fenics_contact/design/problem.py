@@ -107,7 +107,7 @@ def _check_differentiable(scene: Scene) -> None:
         reasons |= {
             "materials without history": any(map(has_history, materials)),
             "materials without mean_dilatation": any(map(has_mean_dilatation, materials)),
-            "pairs of nonlinear bodies without wear": any(pair.wears for pair in scene.contacts),
+            "pairs of nonlinear bodies without wear": scene.wears,
             "pressures that do not follow their surfaces": bool(scene.following_pressures),
             "nonlinear bodies without ThermalStrain": any(load.temperatures for load in scene.loads),
         }

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact._pairing.points import ContactPoints
-from fenics_contact.feti.ties import same_points
+from fenics_contact.feti.ties import matched, same_points
 from fenics_contact.feti.torn import TornSystem
 
 
@@ -29,22 +29,19 @@ def carried_over(before: TornSystem, multiplier: np.ndarray, after: TornSystem) 
     tau = before.numbering.gather(multiplier, before.tangential_rows.ravel()).reshape(
         -1, before.components - 1
     )
-    match = same_contacts(before, after)
-    matched = match >= 0
-    values = np.zeros(after.points.count)
-    values[matched] = normal[match[matched]]
     friction = np.zeros((before.points.count, before.components))
     if len(before.frictional):
         friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
-    in_space = np.zeros((after.points.count, before.components))
-    in_space[matched] = friction[match[matched]]
-    put_contact(after, start, values, in_space)
+    put_contact(after, start, *(on_contacts(before, each, after) for each in (normal, friction)))
     return start
 
 
-def same_contacts(before: TornSystem, after: TornSystem) -> np.ndarray:
-    """Return for each contact point of a system that of one before, by pair and slave node; −1 if new."""
-    return same_points(_renumbered(before, after), after.points)
+def on_contacts(before: TornSystem, values: np.ndarray, after: TornSystem) -> np.ndarray:
+    """Return values of contact points, (n, ...), at those of the system after, zero at new ones.
+
+    Points are identified by pair and slave node.
+    """
+    return matched(values, same_points(_renumbered(before, after), after.points))
 
 
 def _held_otherwise(before: TornSystem, multiplier: np.ndarray, after: TornSystem) -> np.ndarray:

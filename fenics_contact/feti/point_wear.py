@@ -13,58 +13,61 @@ from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.wear import Wear, WearCurve
 from fenics_contact.errors import together
+from fenics_contact.feti.ties import matched, same_points
 from fenics_contact.feti.torn import TornSystem, Unworn
 from fenics_contact.qp.compliance import Closures
 
 
 @dataclass(frozen=True, eq=False)
 class AtNodes:
-    """Values by pair and slave node; `key`: both, shape (2, n); `values`: shape (n, k)."""
+    """Values by pair and slave node, shape (n, k)."""
 
-    key: np.ndarray
+    pair: np.ndarray
+    slave: np.ndarray
     values: np.ndarray
 
     @classmethod
     def of(cls, points: ContactPoints, values: np.ndarray) -> AtNodes:
         """Return the values at contact points."""
-        return cls(np.stack([points.pair, points.slave]), values)
+        return cls(points.pair, points.slave, values)
+
+    @classmethod
+    def keyed(cls, key: np.ndarray, values: np.ndarray) -> AtNodes:
+        """Return the values at pairs and slave nodes, (2, n), see `key`."""
+        return cls(key[0], key[1], values)
 
     @classmethod
     def none(cls) -> AtNodes:
         """Return no values."""
-        return cls(np.zeros((2, 0), dtype=np.int64), np.zeros((0, 1)))
+        nowhere = np.zeros(0, dtype=np.int64)
+        return cls(nowhere, nowhere, np.zeros((0, 1)))
+
+    @property
+    def key(self) -> np.ndarray:
+        """Pairs and slave nodes, shape (2, n)."""
+        return np.stack([self.pair, self.slave])
 
     def on(self, points: ContactPoints) -> np.ndarray:
         """Return the values at other points, zero where there is none, shape (n_points, k)."""
-        width = 1 + int(max(self.key[1].max(initial=0), points.slave.max(initial=0)))
-        known, now = self.key[0] * width + self.key[1], points.pair * width + points.slave
-        _, there, here = np.intersect1d(known, now, return_indices=True)
-        found = np.zeros((points.count, self.values.shape[1]))
-        found[here] = self.values[there]
-        return found
+        return matched(self.values, same_points(self, points))
 
     def updated(self, points: ContactPoints, values: np.ndarray) -> AtNodes:
         """Return these with other values at some points, (n_points, k)."""
-        now = AtNodes.of(points, values)
-        old = ~now._has(self.key)
+        old = same_points(points, self) < 0
         return AtNodes(
-            np.concatenate([self.key[:, old], now.key], axis=1),
-            np.concatenate([self.values[old], values]) if old.any() else values,
+            np.concatenate([self.pair[old], points.pair]),
+            np.concatenate([self.slave[old], points.slave]),
+            np.concatenate([self.values[old], values]),
         )
-
-    def _has(self, key: np.ndarray) -> np.ndarray:
-        """Return which of other keys are among these, shape (n,)."""
-        width = 1 + int(max(self.key[1].max(initial=0), key[1].max(initial=0)))
-        return np.isin(key[0] * width + key[1], self.key[0] * width + self.key[1])
 
 
 @dataclass(frozen=True, eq=False)
 class PointWear(Unworn):
     """Wear of the points of pairs, replicated.
 
-    `pairs`: for each law the numbers of its points; `factor`: by which distance and curve are multiplied,
-    (n_contact,); `places`: of slave nodes, (n_contact, dim); `lost`: what all nodes had lost that there ever
-    were points at, where bodies move far.
+    `laws`: with the places of their pairs in words and the numbers of their points; `factor`: by which
+    distance and curve are multiplied, (n_contact,); `places`: of slave nodes, (n_contact, dim); `lost`:
+    what all nodes had lost that there ever were points at, where bodies move far.
     """
 
     laws: Sequence[tuple[str, Wear, np.ndarray]]

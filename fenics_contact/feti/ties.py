@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -45,15 +46,34 @@ class JoinedPoints(Relations, Joint):
         return np.where(match >= 0, np.einsum("rd,rd->r", forces[match], self.directions), 0.0)
 
 
-def same_points(before: ContactPoints, after: ContactPoints) -> np.ndarray:
+class PairedNodes(Protocol):
+    """What points are known by from one system to the next."""
+
+    @property
+    def pair(self) -> np.ndarray:
+        """Numbers of their pairs, shape (n,)."""
+
+    @property
+    def slave(self) -> np.ndarray:
+        """Their slave nodes, shape (n,)."""
+
+
+def same_points(before: PairedNodes, after: PairedNodes) -> np.ndarray:
     """Return for each new point the old one of the same pair and slave node, −1 where there is none."""
-    if before.count == 0:
-        return np.full(after.count, -1)
+    if len(before.slave) == 0:
+        return np.full(len(after.slave), -1)
     width = int(max(before.slave.max(), after.slave.max(initial=0))) + 1
     old, new = before.pair * width + before.slave, after.pair * width + after.slave
     order = np.argsort(old)
-    index = np.minimum(np.searchsorted(old[order], new), before.count - 1)
+    index = np.minimum(np.searchsorted(old[order], new), len(old) - 1)
     return np.where(old[order[index]] == new, order[index], -1)
+
+
+def matched(values: np.ndarray, match: np.ndarray) -> np.ndarray:
+    """Return values (n, ...) at the numbers of points, zero where these are −1, shape (n_points, ...)."""
+    found = np.zeros((len(match), *values.shape[1:]))
+    found[match >= 0] = values[match[match >= 0]]
+    return found
 
 
 @dataclass(frozen=True, eq=False)

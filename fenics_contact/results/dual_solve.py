@@ -61,13 +61,13 @@ def sticking(torn: TornSystem, values: RowValues) -> np.ndarray:
 
 
 def worn_by(contact: ContactResult, torn: TornSystem) -> ContactResult:
-    """Return the result with the wear of its slip, which closes gaps as far as it has opened them."""
+    """Return a result without wear with that of its pressures and slips, by which gaps are wider."""
     worn = torn.wear.depth(contact.normal_force / torn.points.area, contact.slip)
-    return replace(contact, worn=worn, gap=contact.gap - contact.worn + worn)
+    return replace(contact, worn=worn, worn_before=torn.wear.before, gap=contact.gap + worn)
 
 
 def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray) -> ContactResult:
-    """Gather forces, gaps and status of all contact points on every rank. Collective."""
+    """Gather forces, gaps and status of all contact points on every rank, see `worn_by`. Collective."""
     rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
     gathered = [torn.numbering.gather(x, rows) for x in (values.multiplier, values.residual, values.step)]
     count, frictional = torn.points.count, torn.frictional
@@ -88,24 +88,19 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
         full[frictional], full[slips.frictionless] = values, others
         return full
 
-    normal_force = np.where(trial_normal > 0, np.maximum(normal, 0.0), 0.0)
-    slips_of_all = spread(slip, torn.sliding(displacement) - torn.slid)
-    worn = torn.wear.depth(normal_force / torn.points.area, slips_of_all)
-    gap = gap + torn.reach + worn
+    gap = gap + torn.reach
     origin = torn.numbering.gather(torn.right + torn.supported, torn.tangential_rows.ravel())
     return ContactResult(
         torn.points,
-        normal_force,
+        np.where(trial_normal > 0, np.maximum(normal, 0.0), 0.0),
         spread(tau),
         spread(bound),
         gap,
-        slips_of_all,
+        spread(slip, torn.sliding(displacement) - torn.slid),
         spread(origin.reshape(-1, torn.components - 1), torn.slid),
         status,
         torn.points.area,
         torn.points.area,
         torn.scene.kinematics.balanced,
         torn.fluid.wet,
-        worn,
-        torn.wear.before,
     )
