@@ -64,6 +64,7 @@ FLOORS = [
         Room("_adaptive", "a quantity to an accuracy", "model"),
         Room("_wear", "wear over cycles", "numbers"),
     ],
+    [Room("heat", "through bodies and contacts, from friction, and what it does to contact", "model")],
     [
         Room("_responses", "functions", "beside"),
         Room("_scene_file", "TOML", "beside"),

@@ -346,7 +346,7 @@ class TornSystem:
     @property
     def tangential_rows(self) -> np.ndarray:
         """Row numbers of every frictional point's tangential multipliers, shape (n_friction, dim - 1)."""
-        return self.groups.rows_of(self.groups.slips).reshape(-1, self.components - 1)
+        return self.groups.rows_of(self.groups.slips).reshape(-1, max(self.components - 1, 1))
 
     def gathered(self, multiplier: np.ndarray, group: RowGroup) -> np.ndarray:
         """Return the entries of an owned vector in the rows of a group, on every rank. Collective."""
@@ -455,10 +455,10 @@ def build_torn_system(
         free = free_motions(scene, decomposition.tearing)
     if previous is not None and _is_alike(scene, decomposition, previous, prescribed):
         # Only loads and prescribed values changed: B stays the same object, which marks F as unchanged, too.
-        return _at_rest(scene, decomposition, subdomains, previous, prescribed, free)
+        return at_rest(scene, decomposition, subdomains, previous, prescribed, free)
     groups = _found(scene, decomposition, overlap, previous, prescribed)
-    rows = _numbered(groups, decomposition, None if previous is None else previous.numbering)
-    return _at_rest(scene, decomposition, subdomains, rows, prescribed, free)
+    rows = numbered(groups, decomposition, None if previous is None else previous.numbering)
+    return at_rest(scene, decomposition, subdomains, rows, prescribed, free)
 
 
 def with_points(torn: TornSystem, points: ContactPoints) -> TornSystem:
@@ -467,10 +467,10 @@ def with_points(torn: TornSystem, points: ContactPoints) -> TornSystem:
         return torn
     scene, decomposition = torn.scene, torn.decomposition
     prescribed, _ = once_a_machine(decomposition.comm, lambda: prescribed_along(scene, decomposition.tearing))
-    groups = _with_contact(scene, decomposition, torn.groups.joints, points, prescribed)
-    rows = _numbered(groups, decomposition, torn.numbering)
+    groups = with_contact(scene, decomposition, torn.groups.joints, points, prescribed)
+    rows = numbered(groups, decomposition, torn.numbering)
     free = free_motions(scene, decomposition.tearing)
-    return _at_rest(scene, decomposition, torn.subdomains, rows, prescribed, free)
+    return at_rest(scene, decomposition, torn.subdomains, rows, prescribed, free)
 
 
 def with_points_inside(torn: TornSystem, other: TornSystem) -> TornSystem:
@@ -487,7 +487,7 @@ class NumberedRows:
     B: sp.csr_matrix
 
 
-def _at_rest(
+def at_rest(
     scene: Scene,
     decomposition: Decomposition,
     subdomains: tuple[Subdomain, ...],
@@ -540,7 +540,7 @@ def _found(
             points, left = joint.once(points, left, scene, prescribed)
     if left is not ties:
         found = _joints(scene, decomposition, left, found)
-    groups = _with_contact(scene, decomposition, found, points, prescribed)
+    groups = with_contact(scene, decomposition, found, points, prescribed)
     if decomposition.comm.rank == 0:
         _log_held(groups.slips, decomposition.fixed)
     return groups
@@ -556,7 +556,7 @@ def _joints(
     return tuple(found)
 
 
-def _with_contact(
+def with_contact(
     scene: Scene,
     decomposition: Decomposition,
     joints: tuple[Joint, ...],
@@ -576,8 +576,8 @@ def on_contact_rows(
 ) -> TornSystem:
     """Return a system with other contact points, those of bodies that have moved. Collective."""
     scene, decomposition = torn.scene, torn.decomposition
-    groups = _with_contact(scene, decomposition, torn.groups.joints, points, prescribed, further)
-    rows = _numbered(groups, decomposition, torn.numbering)
+    groups = with_contact(scene, decomposition, torn.groups.joints, points, prescribed, further)
+    rows = numbered(groups, decomposition, torn.numbering)
     owned, before = rows.numbering.owned, torn.numbering.owned
     # Each rank owns the same rows of equality.
     equality, kept = (np.flatnonzero(each < torn.n_equality) for each in (owned, before))
@@ -600,7 +600,7 @@ def _log_held(rows: TangentialRows, fixed: np.ndarray) -> None:
         safe_log(_LOG.info, words, held, rows.count)
 
 
-def _numbered(groups: RowGroups, decomposition: Decomposition, known: DualNumbering | None) -> NumberedRows:
+def numbered(groups: RowGroups, decomposition: Decomposition, known: DualNumbering | None) -> NumberedRows:
     """Number the multipliers and select the entries of B that act on this rank's subdomains. Collective."""
     comm, tearing = decomposition.comm, decomposition.tearing
     parts = [each.rows(tearing, decomposition.fixed) for each in groups]

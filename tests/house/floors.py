@@ -18,6 +18,7 @@ FLOORS = [
     {"_equilibrium"},
     {"design"},
     {"_adaptive", "_wear"},
+    {"heat"},
     {"_scene_file", "output", "pictures", "_responses"},
     {"_page", "decks", "study"},
     {"_cli"},

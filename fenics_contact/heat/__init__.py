@@ -1,0 +1,56 @@
+"""Heat: through bodies, through contacts, from friction, and what it does to contact."""
+
+from typing import TYPE_CHECKING
+
+from fenics_contact._base.late_names import late_names
+
+if TYPE_CHECKING:
+    from fenics_contact.heat.conductance import (
+        Conductance,
+        ConductanceTable,
+        EvenConductance,
+        GapConductance,
+        GapRadiation,
+        PressureConductance,
+        harmonic_mean,
+    )
+    from fenics_contact.heat.parts import (
+        Convection,
+        HeatAtNodes,
+        HeatFlux,
+        HeatSource,
+        HeldTemperature,
+        Radiation,
+    )
+    from fenics_contact.heat.problem import HeatProblem, solve_heat
+    from fenics_contact.heat.properties import Conductor, TemperatureTable
+    from fenics_contact.heat.scene import ConductingBody, HeatScene, ThermalContact
+    from fenics_contact.heat.state import HeatBalance, HeatState, HeatThroughContact
+
+__all__ = [
+    "Conductance",
+    "ConductanceTable",
+    "ConductingBody",
+    "Conductor",
+    "Convection",
+    "EvenConductance",
+    "GapConductance",
+    "GapRadiation",
+    "HeatAtNodes",
+    "HeatBalance",
+    "HeatFlux",
+    "HeatProblem",
+    "HeatScene",
+    "HeatSource",
+    "HeatState",
+    "HeatThroughContact",
+    "HeldTemperature",
+    "PressureConductance",
+    "Radiation",
+    "TemperatureTable",
+    "ThermalContact",
+    "harmonic_mean",
+    "solve_heat",
+]
+
+__getattr__, __dir__ = late_names(__name__)

@@ -1,0 +1,125 @@
+"""Subdomains at temperatures: matrices, loads, and what is kept of them from one solution to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.csr import Csr
+from fenics_contact._fem.composition import composition
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.by_shape import BY_MATRIX
+from fenics_contact.feti.subdomain import CachedMatrix, Subdomain
+from fenics_contact.heat.exchange import Exchange
+from fenics_contact.heat.forms import Part
+from fenics_contact.heat.parts import HeatLoad
+from fenics_contact.heat.scene import HeatScene
+
+
+@dataclass(frozen=True, eq=False)
+class Rate:
+    """How fast heat is stored at the end of a time step: a C (T − T₀) − s, with C the capacity between both.
+
+    `factor`: a, [1 / time], zero in a steady state; `before`: T₀ at all nodes, (n_nodes,); `history`: s on
+    each subdomain of this rank, [power].
+    """
+
+    factor: float
+    before: np.ndarray
+    history: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Heated:
+    """A subdomain at some temperature.
+
+    `exchanges`: with each load that acts on it, by its number; `stored`: the heat that goes into it.
+    """
+
+    subdomain: Subdomain
+    exchanges: Mapping[int, Exchange]
+    stored: Exchange
+
+
+class Assembly:
+    """Assembles one subdomain, again and again."""
+
+    def __init__(self, part: Part) -> None:
+        """Prepare; nothing is assembled yet."""
+        self.part = part
+        self._known: dict[HeatLoad, Exchange] = {}
+        self._last: tuple[object, Subdomain] | None = None
+
+    @cached_property
+    def _conduction(self) -> sp.csr_matrix:
+        """K of a body whose conductivity is constant."""
+        return self.part.conduction(np.zeros(self.part.mesh.size))
+
+    @cached_property
+    def _capacity(self) -> sp.csr_matrix:
+        """C of a body whose capacity is constant."""
+        nothing = np.zeros(self.part.mesh.size)
+        return self.part.capacity(nothing, nothing)
+
+    def heated(self, scene: HeatScene, temperature: np.ndarray, rate: Rate, number: int) -> Heated:
+        """Return the subdomain at temperatures of the nodes of its body, (n_nodes,).
+
+        `number`: that of the subdomain on this rank.
+        """
+        part, linear = self.part, self.part.body.is_linear
+        part.place()
+        nodes = part.mesh.nodes
+        acting = {k: load for k, load in enumerate(scene.loads) if load.body == part.mesh.body}
+        exchanges = {k: self._exchange(load, temperature[nodes]) for k, load in acting.items()}
+        stored = self._stored(rate, temperature[nodes], rate.before[nodes], number)
+        bed = sum((each.matrix for each in exchanges.values()), stored.matrix)
+        key = tuple(id(each.matrix) for each in (*exchanges.values(), stored) if each.matrix.nnz)
+        load = sum((each.load for each in exchanges.values()), stored.load)
+        if not np.isfinite(load).all():
+            raise InvalidInputError(f"heat on {part.name} must be finite, got {load}: check loads and laws")
+        if not linear or self._last is None or self._last[0] != key:
+            conduction = self._conduction if linear else part.conduction(temperature[nodes])
+            self._last = key, self._subdomain(conduction, bed.tocsr())
+        force = part.mesh.following.force(load)
+        return Heated(replace(self._last[1], load=force), exchanges, stored)
+
+    def _exchange(self, load: HeatLoad, temperature: np.ndarray) -> Exchange:
+        if not load.is_linear:
+            return load.exchange(self.part, temperature)
+        if load not in self._known:
+            self._known[load] = load.exchange(self.part, temperature)
+        return self._known[load]
+
+    def _stored(self, rate: Rate, temperature: np.ndarray, before: np.ndarray, number: int) -> Exchange:
+        size = self.part.mesh.size
+        if not rate.factor:
+            return Exchange(Csr((size, size)), np.zeros(size))
+        constant = self.part.body.is_linear
+        C = self._capacity if constant else self.part.capacity(before, temperature)
+        matrix = self._scaled(C, rate.factor) if constant else (rate.factor * C).tocsr()
+        return Exchange(matrix, matrix @ before + rate.history[number])
+
+    def _scaled(self, matrix: sp.csr_matrix, factor: float) -> sp.csr_matrix:
+        """Return a C, the same object for the same factor."""
+        known = self.__dict__.setdefault("_by_factor", {})
+        if factor not in known:
+            known.clear()
+            known[factor] = (factor * matrix).tocsr()
+        return known[factor]
+
+    def _subdomain(self, conduction: sp.csr_matrix, bed: sp.csr_matrix) -> Subdomain:
+        mesh, field = self.part.mesh, self.part.field
+        whole = mesh.following.stiffness((conduction + bed).tocsr())
+        ones = np.ones((mesh.size, 1))
+        resistance = float(bed.sum()) / mesh.size
+        held = resistance > 0.0
+        return Subdomain(
+            mesh, composition(field, mesh.cells), (), (), self.part.points, np.zeros(mesh.size),
+            ones[:, :0] if held else ones, float(conduction.diagonal().mean()), CachedMatrix(lambda: whole),
+            ones / np.sqrt(mesh.size) if held else ones[:, :0],
+            np.array([resistance]) if held else np.zeros(0), (), BY_MATRIX,
+        )  # fmt: skip

@@ -1,0 +1,117 @@
+"""Points at which heat passes between surfaces: their resistances, and how curved the gap is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.shared import once_a_machine
+from fenics_contact._pairing.points import ContactPoints, NodeNumbers
+from fenics_contact._scene.fields import evaluate, not_negative
+from fenics_contact._scene.local_axes import NO_AXES, LocalAxes
+from fenics_contact._scene.parts import slave_of
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.torn import contact_and_tied_points
+from fenics_contact.heat.conductance import Touch
+from fenics_contact.heat.curvature import spread as shell_spread
+from fenics_contact.heat.rows import ConductingRows
+from fenics_contact.heat.scene import HeatScene
+
+
+@dataclass(frozen=True, eq=False)
+class _Unheld:
+    """What the search for points asks of a decomposition: no temperature hides a point."""
+
+    tearing: object
+    fixed: np.ndarray
+    comm: MPI.Comm
+    axes: LocalAxes = NO_AXES
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """The points of all contacts and ties of a scene, replicated.
+
+    `points`: of contacts; `tied`: of ties; `area`: that of each point, with the thickness of plane bodies,
+    (n,); `opposite`: temperatures of obstacles, zero on bodies, (n,); `on_obstacle`: which are, (n,);
+    `pressure`: that which contacts were given, (n,); `spread`: see `Touch`.
+    """
+
+    scene: HeatScene
+    points: ContactPoints
+    tied: ContactPoints
+    area: np.ndarray
+    opposite: np.ndarray
+    on_obstacle: np.ndarray
+    pressure: np.ndarray
+    spread: np.ndarray
+
+    @classmethod
+    def of(cls, scene: HeatScene, decomposition: Decomposition) -> Joints:
+        """Find the points of a scene. Collective."""
+        comm, tearing = decomposition.comm, decomposition.tearing
+        fixed = np.zeros((tearing.n_nodes, scene.geometry.dim), dtype=bool)
+        search = _Unheld(tearing, fixed, comm)
+        points, tied = contact_and_tied_points(scene.geometry, search, overlap=True)  # type: ignore[arg-type]
+        return once_a_machine(comm, lambda: _described(scene, points, tied))
+
+    def touch(self, temperature: np.ndarray, pressure: np.ndarray, gap: np.ndarray) -> Touch:
+        """Return what conductances depend on at temperatures of all nodes, (n_nodes,)."""
+        slave, master = self.sides(temperature)
+        return Touch(pressure, np.maximum(gap, 0.0), slave, master, self.spread)
+
+    def sides(self, temperature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the temperatures of slave and master at the points, (n,) each."""
+        slave = np.asarray(self.points.own @ temperature)
+        return slave, np.where(self.on_obstacle, self.opposite, self.points.master @ temperature)
+
+    def conductance(self, touch: Touch) -> np.ndarray:
+        """Return h at the points, (n,), [power / (length² · degree)]."""
+        h = np.zeros(self.points.count)
+        for number, contact in enumerate(self.scene.contacts):
+            mine = np.flatnonzero(self.points.pair == number)
+            parts = (getattr(touch, name)[mine] for name in ("pressure", "gap", "slave", "master", "spread"))
+            values = np.asarray(contact.law.at(Touch(*parts)), dtype=np.float64)
+            if values.shape != mine.shape or not ((values >= 0.0) & (values < np.inf)).all():
+                raise InvalidInputError(
+                    f"the conductance of {contact.place} must be finite and not negative at each of "
+                    f"{len(mine)} points, got {values}: correct {type(contact.law).__name__}"
+                )
+            h[mine] = values
+        return h
+
+    @property
+    def places(self) -> np.ndarray:
+        """Where the slave nodes of the points are, (n, dim)."""
+        return self.scene.geometry.points[self.points.slave]
+
+    def rows(self, conductance: np.ndarray) -> tuple[ConductingRows, ConductingRows]:
+        """Return the rows of ties, and of the points that conduct at all."""
+        perfect = np.zeros(self.tied.count)
+        conducts = np.flatnonzero(conductance * self.area > 0.0)
+        resistance = 1.0 / (conductance * self.area)[conducts]
+        passing = ConductingRows.at(self.points.part(conducts), resistance, self.opposite[conducts])
+        return ConductingRows.at(self.tied, perfect, perfect), passing
+
+
+def _described(scene: HeatScene, points: ContactPoints, tied: ContactPoints) -> Joints:
+    count = points.count
+    opposite, pressure, spread = np.zeros(count), np.zeros(count), np.ones(count)
+    on_obstacle, area = np.zeros(count, dtype=bool), points.area.copy()
+    places, numbers = scene.geometry.points[points.slave], NodeNumbers.of(scene.geometry)
+    for number, contact in enumerate(scene.contacts):
+        mine = np.flatnonzero(points.pair == number)
+        pair = scene.geometry.contacts[number]
+        area[mine] *= scene.bodies[pair.slave.body].thickness
+        pressure[mine] = not_negative(f"the pressure of {contact.place}", contact.pressure, places[mine])
+        surface = slave_of(scene.geometry, pair, pair.slave_geometry)
+        place = np.searchsorted(surface.nodes, points.slave[mine] - numbers.first_of(pair.slave.body))
+        spread[mine] = shell_spread(surface, place, points.gap[mine])
+        if not pair.between_bodies:
+            on_obstacle[mine], given = True, contact.temperature
+            name = f"the temperature of the obstacle of {contact.place}"
+            opposite[mine] = evaluate(name, given, places[mine], ()) if callable(given) else given
+    return Joints(scene, points, tied, area, opposite, on_obstacle, pressure, spread)

@@ -1,0 +1,314 @@
+"""Temperatures of a scene: its subdomains, joints, and the iteration where laws depend on temperatures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._base.shared import once_a_machine
+from fenics_contact._pairing.points import join_points
+from fenics_contact.errors import ConvergenceError, collectively, together
+from fenics_contact.feti.all_rows import RowGroups
+from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
+from fenics_contact.feti.decomposition import Decomposition, decompose, prescribed_along
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.free_motions import free_motions
+from fenics_contact.feti.row_groups import Glued
+from fenics_contact.feti.torn import TornSystem, at_rest, numbered
+from fenics_contact.heat.acceleration import Anderson
+from fenics_contact.heat.assembly import Assembly, Heated, Rate
+from fenics_contact.heat.forms import HeatForms, Part
+from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.rows import ConductingRows
+from fenics_contact.heat.scene import HeatScene
+from fenics_contact.heat.state import HeatBalance, HeatState, HeatThroughContact
+from fenics_contact.qp.face_newton import ProjectedCG
+from fenics_contact.qp.solution import DualSolution
+from fenics_contact.results.dual_solve import solve_dual
+
+#: Largest relative residual of a linear system.
+TOLERANCE = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class GivenContact:
+    """What mechanics gives to the points of contacts: pressures and gaps, (n,) each."""
+
+    pressure: np.ndarray
+    gap: np.ndarray
+
+
+@displayed
+class HeatProblem:
+    """Successive temperatures of a scene; meshes, numbering, points and factors stay where they can.
+
+    Attributes:
+        scene: The scene as it was given.
+        comm: Communicator over which the subdomains are spread.
+        tolerance: Largest relative residual of linear systems.
+        timer: Wall time of this rank by phase, over all solutions.
+        state: The last solution, None before the first.
+    """
+
+    state: HeatState | None
+
+    def __init__(
+        self,
+        scene: HeatScene,
+        comm: MPI.Comm,
+        *,
+        partitions: Mapping[str, np.ndarray] | None = None,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        """Prepare; nothing is computed yet. Arguments as for `solve_heat`."""
+        self.scene, self.comm, self.tolerance = scene, comm, tolerance
+        self.timer, self.state = PhaseTimer(), None
+        self._partitions = partitions
+        self._decomposition: Decomposition | None = None
+        self._assemblies: tuple[Assembly, ...] = ()
+
+    @property
+    def decomposition(self) -> Decomposition:
+        """The subdomains. Collective on first use."""
+        if self._decomposition is None:
+            field, ranks = self.scene.field, self.comm.size
+            with self.timer.phase("decompose"):
+                cut = self._partitions or once_a_machine(self.comm, lambda: field.partition(ranks))
+                self._decomposition = decompose(field, cut, self.comm)
+                forms = HeatForms(self._decomposition.forms.templates)
+                self._assemblies = tuple(
+                    Assembly(Part(mesh, self.scene.bodies[mesh.body], field.bodies[mesh.body], forms))
+                    for mesh in self._decomposition.meshes
+                )
+        return self._decomposition
+
+    @property
+    def no_rate(self) -> Rate:
+        """The rate of a steady state. Collective on first use."""
+        decomposition = self.decomposition
+        history = tuple(np.zeros(mesh.size) for mesh in decomposition.meshes)
+        return Rate(0.0, np.zeros(decomposition.tearing.n_nodes), history)
+
+    @collectively("HeatProblem.solve", lambda self, *_, **__: self.comm)
+    def solve(
+        self,
+        scene: HeatScene | None = None,
+        *,
+        rate: Rate | None = None,
+        given: GivenContact | None = None,
+        most: int = 60,
+    ) -> HeatState:
+        """Return the temperatures of a scene, by default the given one, in a steady state. Collective.
+
+        Args:
+            scene: One with the same bodies.
+            rate: How fast heat is stored; None: not at all.
+            given: Pressures and gaps of contacts; None: as the scene says.
+            most: Linear systems after which an iteration is given up.
+        """
+        scene = scene or self.scene
+        decomposition = self.decomposition.holding(scene.field)
+        HeatForms(decomposition.forms.templates).prepare(scene)
+        with self.timer.phase("pair"):
+            joints = Joints.of(scene, decomposition)
+        iteration = _Iteration(self, scene, decomposition, joints, rate or self.no_rate,
+                               given or GivenContact(joints.pressure, joints.points.gap))  # fmt: skip
+        self.state = iteration.run(self.state, most)
+        return self.state
+
+
+@dataclass(frozen=True, eq=False)
+class _Iteration:
+    """Linear systems until laws agree with the temperatures that they lead to."""
+
+    problem: HeatProblem
+    scene: HeatScene
+    decomposition: Decomposition
+    joints: Joints
+    rate: Rate
+    given: GivenContact
+
+    def run(self, last: HeatState | None, most: int, settled: float = 1e-10) -> HeatState:
+        guess, anderson, products = self._first(last), Anderson(), 0
+        for count in range(1, most + 1):
+            state = self._linear(guess, last, count, products)
+            products, last = state.products, state
+            size = np.abs(state.values - self._level(state.values)).max()
+            change = np.abs(state.values - guess).max()
+            if self.scene.is_linear or change <= settled * size:
+                return state
+            guess = anderson.next(guess, state.values)
+        raise ConvergenceError(
+            f"temperatures do not settle, they change by {change:.2g} of {size:.2g} after {most} systems: "
+            "start from a state nearby, or make steps of the loads"
+        )
+
+    def _first(self, last: HeatState | None) -> np.ndarray:
+        """Return temperatures from which to start: the last ones, those before, or held and ambient ones."""
+        if last is not None:
+            return last.values
+        if self.rate.factor:
+            return self.rate.before
+        count, known = self.decomposition.tearing.n_nodes, [*self.scene.levels]
+        return np.full(count, float(np.mean(known)) if known else 0.0)
+
+    def _level(self, values: np.ndarray) -> float:
+        return float(values.mean())
+
+    def _linear(self, guess: np.ndarray, last: HeatState | None, count: int, products: int) -> HeatState:
+        """Solve the system linearised at temperatures. Collective."""
+        problem, decomposition, timer = self.problem, self.decomposition, self.problem.timer
+        with timer.phase("assemble"), together(decomposition.comm):
+            heated = tuple(self._heated(guess))
+        touch = self.joints.touch(guess, self.given.pressure, self.given.gap)
+        with together(decomposition.comm):
+            conductance = self.joints.conductance(touch)
+        torn = self._torn(heated, self.joints.rows(conductance), last)
+        system = DualSystem(torn, timer, previous=None if last is None else last.system)
+        with timer.phase("solve"):
+            start = None
+            if last is not None and last.torn.numbering is torn.numbering:
+                start = last.solution.multiplier
+            solution = solve_dual(system, ProjectedCG(tolerance=problem.tolerance), start)
+            field = system.displacement(solution.multiplier, solution.alpha)
+        return self._state(system, solution, field, heated, conductance, (count, products))
+
+    def _heated(self, guess: np.ndarray) -> Iterator[Heated]:
+        tearing = self.decomposition.tearing
+        for number, assembly in enumerate(self.problem._assemblies):
+            name = assembly.part.mesh.body
+            first = tearing.first_of(name)
+            own = slice(first, first + self.scene.bodies[name].mesh.n_nodes)
+            rate = Rate(self.rate.factor, self.rate.before[own], self.rate.history)
+            yield assembly.heated(self.scene, guess[own], rate, number)
+
+    def _torn(
+        self,
+        heated: tuple[Heated, ...],
+        joints: tuple[ConductingRows, ConductingRows],
+        last: HeatState | None,
+    ) -> TornSystem:
+        """Return the torn system. Collective."""
+        scene, decomposition = self.scene.field, self.decomposition
+        comm = decomposition.comm
+        prescribed, _ = once_a_machine(comm, lambda: prescribed_along(scene, decomposition.tearing))
+        none = join_points([], scene.dim, decomposition.tearing.n_nodes)
+        normal = NormalRows.of(scene, none, decomposition.axes)
+        slips = TangentialRows.of(scene, none, prescribed, comm, decomposition.axes)
+        groups = RowGroups(Glued(decomposition.gluing), joints, normal, slips)
+        rows = numbered(groups, decomposition, None if last is None else last.torn.numbering)
+        free = free_motions(scene, decomposition.tearing)
+        subdomains = tuple(each.subdomain for each in heated)
+        return at_rest(scene, decomposition, subdomains, rows, prescribed, free)
+
+    def _state(
+        self,
+        system: DualSystem,
+        solution: DualSolution,
+        field: np.ndarray,
+        heated: tuple[Heated, ...],
+        conductance: np.ndarray,
+        counts: tuple[int, int],
+    ) -> HeatState:
+        """Return the state of a solution. Collective."""
+        torn, tearing = system.torn, self.decomposition.tearing
+        values = nodal_mean_at(self.decomposition, field, np.arange(tearing.n_nodes))[:, 0]
+        tied, passing = (torn.gathered(solution.multiplier, group) for group in torn.groups.joints)
+        heat = np.zeros(self.joints.points.count)
+        heat[conductance * self.joints.area > 0.0] = passing
+        balance = self._balance(torn, solution, field, heated, heat)
+        return HeatState(
+            self.scene, torn, system, solution, self.joints, values,
+            self._contacts(values, conductance, heat), tied, balance, counts[0], counts[1] + system.products,
+            dict(self.problem.timer.seconds),
+        )  # fmt: skip
+
+    def _contacts(
+        self, values: np.ndarray, conductance: np.ndarray, heat: np.ndarray
+    ) -> tuple[HeatThroughContact, ...]:
+        joints, found = self.joints, []
+        slave, master = joints.sides(values)
+        for number, contact in enumerate(self.scene.geometry.contacts):
+            mine = np.flatnonzero(joints.points.pair == number)
+            first = self.decomposition.tearing.first_of(contact.slave.body)
+            found.append(
+                HeatThroughContact(
+                    joints.points.slave[mine] - first, joints.places[mine], slave[mine], master[mine],
+                    conductance[mine], heat[mine], heat[mine] / joints.area[mine],
+                )
+            )  # fmt: skip
+        return tuple(found)
+
+    def _balance(
+        self,
+        torn: TornSystem,
+        solution: DualSolution,
+        field: np.ndarray,
+        heated: tuple[Heated, ...],
+        heat: np.ndarray,
+    ) -> HeatBalance:
+        """Return where heat comes from. Collective."""
+        scene, comm = self.scene, self.decomposition.comm
+        entering = np.zeros(len(scene.held) + len(scene.loads) + 1)
+        for each, part in zip(heated, self.decomposition.parts, strict=True):
+            for number, exchange in each.exchanges.items():
+                entering[len(scene.held) + number] += exchange.heat(field[part])
+            entering[-1] -= each.stored.heat(field[part])
+        self._add_held(entering, torn, solution)
+        entering = comm.allreduce(entering)
+        parts: dict[str, float] = {}
+        for acting, own in zip((*scene.held, *scene.loads), entering, strict=False):
+            name = f"{type(acting).__name__} {acting.place}"
+            parts[name] = parts.get(name, 0.0) + float(own)
+        for number, contact in enumerate(scene.contacts):
+            mine = (self.joints.points.pair == number) & self.joints.on_obstacle
+            if mine.any():
+                parts[f"ThermalContact {contact.place}"] = -float(heat[mine].sum())
+        return HeatBalance(parts, float(entering[-1]))
+
+    def _add_held(self, entering: np.ndarray, torn: TornSystem, solution: DualSolution) -> None:
+        """Add the heat that enters this rank's rows of held temperatures, that of each node for its first."""
+        tearing, gluing = self.decomposition.tearing, self.decomposition.gluing
+        first = np.full(tearing.n_nodes, -1)
+        for number, held in reversed([*enumerate(self.scene.held)]):
+            mesh = self.scene.bodies[held.body].mesh
+            first[tearing.global_nodes(held.body, mesh.nodes_to_hold(held.surface))] = number
+        owned = np.flatnonzero(torn.numbering.owned < torn.n_gluing)
+        dof = gluing.dof[torn.numbering.owned[owned]]
+        fixed = gluing.fixed.ravel()[dof]
+        np.subtract.at(entering, first[dof[fixed]], solution.multiplier[owned[fixed]])
+
+
+@collectively("solve_heat", lambda scene, comm, **_: comm)
+def solve_heat(
+    scene: HeatScene,
+    comm: MPI.Comm,
+    *,
+    partitions: Mapping[str, np.ndarray] | None = None,
+    tolerance: float = TOLERANCE,
+) -> HeatState:
+    """Compute the steady temperatures of a scene. Collective on ``comm``.
+
+    Args:
+        scene: Bodies that conduct, what heats and cools them, and where heat passes between them.
+        comm: Communicator over which the subdomains are spread.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body; None cuts the
+            bodies into subdomains of a suitable size.
+        tolerance: Largest relative residual of linear systems.
+
+    Raises:
+        InvalidInputError: If a law gives something that is no conductance, conductivity or capacity.
+        InfeasibleError: If nothing holds the temperature of a heated body.
+        ConvergenceError: If a solver, or the iteration of laws that depend on temperatures, does not settle.
+
+    Example:
+        >>> state = solve_heat(scene, MPI.COMM_WORLD)  # doctest: +SKIP
+        >>> state.temperature["upper"].max()  # doctest: +SKIP
+    """
+    return HeatProblem(scene, comm, partitions=partitions, tolerance=tolerance).solve()

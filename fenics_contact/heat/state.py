@@ -1,0 +1,147 @@
+"""Temperatures of bodies, the heat that passes between them, and the balance of heat."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.scene import HeatScene
+from fenics_contact.mesh.cell_types import cell_type_of, quadrature, shape_gradients, shape_values
+from fenics_contact.qp.solution import DualSolution
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class HeatThroughContact:
+    """What passes at the points of one contact, replicated.
+
+    Attributes:
+        nodes: Slave nodes in the body of the slave, shape (n,).
+        points: Where they are, shape (n, dim), [length].
+        slave: Temperatures of the slave, shape (n,).
+        master: Temperatures of the master opposite, shape (n,).
+        conductance: h, shape (n,), [power / (length² · degree)].
+        heat: Heat that passes from the slave to the master at each point, shape (n,), [power].
+        flux: The same per area, shape (n,), [power / length²].
+    """
+
+    nodes: np.ndarray
+    points: np.ndarray
+    slave: np.ndarray
+    master: np.ndarray
+    conductance: np.ndarray
+    heat: np.ndarray
+    flux: np.ndarray
+
+    @property
+    def total(self) -> float:
+        """Heat that passes from the slave to the master, [power]."""
+        return float(self.heat.sum())
+
+
+@displayed
+@dataclass(frozen=True)
+class HeatBalance:
+    """Where heat comes from, [power], positive where it enters bodies.
+
+    Attributes:
+        by_part: Heat of each held temperature, load and obstacle by its place.
+        stored: Heat that bodies take up.
+    """
+
+    by_part: Mapping[str, float]
+    stored: float
+
+    @property
+    def error(self) -> float:
+        """What comes in less what is stored, relative to all that comes and goes."""
+        flows = np.array([*self.by_part.values(), -self.stored])
+        return float(abs(flows.sum()) / max(np.abs(flows).sum(), np.finfo(float).tiny))
+
+    def _facts(self) -> dict[str, Any]:
+        parts = {name: f"{heat:.6g}" for name, heat in self.by_part.items()}
+        return {**parts, "stored": f"{self.stored:.6g}", "error": f"{self.error:.1e}"}
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class HeatState:
+    """Temperatures of a scene, replicated on all ranks.
+
+    Attributes:
+        scene: The scene.
+        torn: The torn system that was solved.
+        system: Its dual.
+        solution: The result of the dual solver.
+        joints: The points of contacts and ties.
+        values: Temperatures of the nodes of all bodies, body after body, shape (n_nodes,).
+        contacts: What passes through each contact, in the order of the scene.
+        ties: Heat that passes at tied points from slave to master, shape (n,), [power].
+        balance: Where heat comes from and where it goes.
+        iterations: Linear systems that were solved.
+        products: Applications of the dual operator.
+        seconds: Wall time by phase.
+    """
+
+    scene: HeatScene
+    torn: TornSystem
+    system: DualSystem
+    solution: DualSolution
+    joints: Joints
+    values: np.ndarray
+    contacts: tuple[HeatThroughContact, ...]
+    ties: np.ndarray
+    balance: HeatBalance
+    iterations: int
+    products: int
+    seconds: Mapping[str, float]
+
+    @cached_property
+    def temperature(self) -> dict[str, np.ndarray]:
+        """Temperatures at the nodes of each body by its name, shape (n_nodes,) each."""
+        tearing = self.torn.decomposition.tearing
+        starts = tearing.node_offset
+        return {name: self.values[starts[k] : starts[k + 1]] for k, name in enumerate(tearing.body_names)}
+
+    @cached_property
+    def flux(self) -> dict[str, np.ndarray]:
+        """Mean heat flux of each cell by body, (n_cells, dim) each, [power / length²]."""
+        return {
+            name: cell_flux(self.scene, name, temperature) for name, temperature in self.temperature.items()
+        }
+
+    def _facts(self) -> dict[str, Any]:
+        ranges = {
+            f"temperature of {name}": f"{own.min():.6g} to {own.max():.6g}"
+            for name, own in self.temperature.items()
+        }
+        through = {
+            f"heat through {contact.place}": f"{each.total:.6g}"
+            for contact, each in zip(self.scene.contacts, self.contacts, strict=True)
+        }
+        return {**ranges, **through, "balance": self.balance, "iterations": self.iterations,
+                "products": self.products}  # fmt: skip
+
+
+def cell_flux(scene: HeatScene, name: str, temperature: np.ndarray) -> np.ndarray:
+    """Return −k ∇T of the cells of a body, (n_cells, dim)."""
+    body = scene.bodies[name]
+    mesh, cell = body.mesh, cell_type_of(body.mesh.cells, body.mesh.dim)
+    positions, weights = quadrature(cell, 2)
+    gradients = shape_gradients(cell, positions)
+    nodes = mesh.cells
+    jacobian = np.einsum("qkd,cke->cqed", gradients, mesh.points[nodes])
+    slopes = np.einsum("qkd,cqde->cqke", gradients, np.linalg.inv(jacobian))
+    gradient = np.einsum("cqke,ck->cqe", slopes, temperature[nodes])
+    at = np.einsum("qk,ck->cq", shape_values(cell, positions), temperature[nodes])
+    measure = weights * np.abs(np.linalg.det(jacobian))
+    flux = -body.conducted(at, gradient)
+    return np.asarray(np.einsum("cq,cqe->ce", measure, flux) / measure.sum(axis=1)[:, None])
