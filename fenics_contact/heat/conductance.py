@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TypeAlias
 
 import numpy as np
@@ -21,8 +21,8 @@ class Touch:
     """What a conductance depends on, at each point, shape (n,) each.
 
     `pressure`: p ≥ 0, [force / length²]; `gap`: clearance ≥ 0, [length]; `slave` and `master`: temperatures
-    of both sides; `spread`: mean resistance of a shell of the gap's width over that of a plane one, which
-    curved surfaces change.
+    of both sides; of curved gaps `spread`: their resistance over that of plane ones, and `ratio`: the area of
+    the slave over that of the master opposite.
     """
 
     pressure: np.ndarray
@@ -30,6 +30,11 @@ class Touch:
     slave: np.ndarray
     master: np.ndarray
     spread: np.ndarray
+    ratio: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> Touch:
+        """Return that of some points, by indices."""
+        return Touch(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
 
 class Conductance(ABC):
@@ -262,15 +267,17 @@ class GapConductance(Conductance):
 @dataclass(frozen=True)
 @checked()
 class GapRadiation(Conductance):
-    """Radiation between two surfaces that face each other closely: q = σ F (T_s⁴ − T_m⁴).
+    """Radiation between two grey surfaces that face each other closely: q = σ F (T_s⁴ − T_m⁴).
 
-    F = 1 / (1/ε_s + 1/ε_m − 1), as between wide parallel surfaces.
+    1/F = (1/ε_s − 1) + max(1, a) + a (1/ε_m − 1) with a = A_slave / A_master: that of wide parallel surfaces,
+    and where they are curved of long concentric cylinders and of spheres.
 
     Attributes:
         slave_emissivity: ε_s in (0, 1].
         master_emissivity: ε_m in (0, 1].
         absolute_zero: Absolute zero on the scale of all temperatures: 0 in kelvin, −273.15 in °C.
         constant: σ in the units of the scene, see `Radiation`.
+        curved: Whether curvature counts; without, the gap is plane at each point.
     """
 
     by_temperature = True
@@ -278,6 +285,7 @@ class GapRadiation(Conductance):
     master_emissivity: float
     absolute_zero: float = 0.0
     constant: float = STEFAN_BOLTZMANN
+    curved: bool = True
 
     def __post_init__(self) -> None:
         """Reject surfaces that no body has."""
@@ -287,7 +295,7 @@ class GapRadiation(Conductance):
                     f"GapRadiation.{name} must lie above 0 and up to 1, got {getattr(self, name)!r}: "
                     "polished metal has about 0.05, paint 0.9"
                 )
-        check_not_negative("GapRadiation.constant", self.constant, "give 5.670374419e-8 in W, m and K")
+        check_positive("GapRadiation.constant", self.constant, "give 5.670374419e-8 in W, m and K")
 
     def at(self, touch: Touch) -> np.ndarray:
         """Return σ F (T_s² + T_m²) (T_s + T_m)."""
@@ -297,7 +305,9 @@ class GapRadiation(Conductance):
                 f"GapRadiation needs temperatures above absolute zero, {self.absolute_zero:g} on this scale, "
                 "got some below: give absolute_zero=-273.15 with degrees Celsius"
             )
-        factor = self.constant / (1.0 / self.slave_emissivity + 1.0 / self.master_emissivity - 1.0)
+        ratio = touch.ratio if self.curved else np.ones(len(one))
+        lacking = (1.0 / self.slave_emissivity - 1.0) + ratio * (1.0 / self.master_emissivity - 1.0)
+        factor = self.constant / (lacking + np.maximum(1.0, ratio))
         return np.asarray(factor * (one**2 + other**2) * (one + other))
 
 

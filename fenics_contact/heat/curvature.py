@@ -39,8 +39,10 @@ def principal_curvatures(surface: FacetedSurface) -> np.ndarray:
     return np.column_stack([middle - half, middle + half])
 
 
-def spread(surface: FacetedSurface, place: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """Return by how much curvature changes the resistance of gaps, ∫ ds / Π (1 + κ g s) from 0 to 1, (n,).
+def shells(surface: FacetedSurface, place: np.ndarray, gap: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return what curvature makes of gaps, relative to plane ones, (n,) each.
+
+    Their resistance, ∫ ds / Π (1 + κ g s) from 0 to 1, and the area of the surface over that opposite.
 
     `place`: positions of points among the nodes of the surface, (n,); `gap`: (n,), [length].
     """
@@ -48,5 +50,6 @@ def spread(surface: FacetedSurface, place: np.ndarray, gap: np.ndarray) -> np.nd
     steps, weights = np.polynomial.legendre.leggauss(16)
     width = curvature * np.maximum(gap, 0.0)[:, None]
     # A shell that would end in a point has no other side there: facets of edges are no such shells.
-    layers = np.maximum(1.0 + width[:, None] * (0.5 * (steps + 1.0))[:, None], 0.05).prod(axis=2)
-    return np.asarray((0.5 * weights / layers).sum(axis=1))
+    places = np.append(0.5 * (steps + 1.0), 1.0)
+    layers = np.maximum(1.0 + width[:, None] * places[:, None], 0.05).prod(axis=2)
+    return (0.5 * weights / layers[:, :-1]).sum(axis=1), 1.0 / layers[:, -1]

@@ -16,7 +16,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.torn import contact_and_tied_points
 from fenics_contact.heat.conductance import Touch
-from fenics_contact.heat.curvature import spread as shell_spread
+from fenics_contact.heat.curvature import shells
 from fenics_contact.heat.rows import ConductingRows
 from fenics_contact.heat.scene import HeatScene
 
@@ -37,7 +37,7 @@ class Joints:
 
     `points`: of contacts; `tied`: of ties; `area`: that of each point, with the thickness of plane bodies,
     (n,); `opposite`: temperatures of obstacles, zero on bodies, (n,); `on_obstacle`: which are, (n,);
-    `pressure`: that which contacts were given, (n,); `spread`: see `Touch`.
+    `pressure`: that which contacts were given, (n,); `spread` and `ratio`: see `Touch`.
     """
 
     scene: HeatScene
@@ -48,6 +48,7 @@ class Joints:
     on_obstacle: np.ndarray
     pressure: np.ndarray
     spread: np.ndarray
+    ratio: np.ndarray
 
     @classmethod
     def of(cls, scene: HeatScene, decomposition: Decomposition) -> Joints:
@@ -61,7 +62,7 @@ class Joints:
     def touch(self, temperature: np.ndarray, pressure: np.ndarray, gap: np.ndarray) -> Touch:
         """Return what conductances depend on at temperatures of all nodes, (n_nodes,)."""
         slave, master = self.sides(temperature)
-        return Touch(pressure, np.maximum(gap, 0.0), slave, master, self.spread)
+        return Touch(pressure, np.maximum(gap, 0.0), slave, master, self.spread, self.ratio)
 
     def sides(self, temperature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the temperatures of slave and master at the points, (n,) each."""
@@ -73,8 +74,7 @@ class Joints:
         h = np.zeros(self.points.count)
         for number, contact in enumerate(self.scene.contacts):
             mine = np.flatnonzero(self.points.pair == number)
-            parts = (getattr(touch, name)[mine] for name in ("pressure", "gap", "slave", "master", "spread"))
-            values = np.asarray(contact.law.at(Touch(*parts)), dtype=np.float64)
+            values = np.asarray(contact.law.at(touch.part(mine)), dtype=np.float64)
             if values.shape != mine.shape or not ((values >= 0.0) & (values < np.inf)).all():
                 raise InvalidInputError(
                     f"the conductance of {contact.place} must be finite and not negative at each of "
@@ -99,7 +99,7 @@ class Joints:
 
 def _described(scene: HeatScene, points: ContactPoints, tied: ContactPoints) -> Joints:
     count = points.count
-    opposite, pressure, spread = np.zeros(count), np.zeros(count), np.ones(count)
+    opposite, pressure, spread, ratio = np.zeros(count), np.zeros(count), np.ones(count), np.ones(count)
     on_obstacle, area = np.zeros(count, dtype=bool), points.area.copy()
     places, numbers = scene.geometry.points[points.slave], NodeNumbers.of(scene.geometry)
     for number, contact in enumerate(scene.contacts):
@@ -109,9 +109,9 @@ def _described(scene: HeatScene, points: ContactPoints, tied: ContactPoints) -> 
         pressure[mine] = not_negative(f"the pressure of {contact.place}", contact.pressure, places[mine])
         surface = slave_of(scene.geometry, pair, pair.slave_geometry)
         place = np.searchsorted(surface.nodes, points.slave[mine] - numbers.first_of(pair.slave.body))
-        spread[mine] = shell_spread(surface, place, points.gap[mine])
+        spread[mine], ratio[mine] = shells(surface, place, points.gap[mine])
         if not pair.between_bodies:
             on_obstacle[mine], given = True, contact.temperature
             name = f"the temperature of the obstacle of {contact.place}"
             opposite[mine] = evaluate(name, given, places[mine], ()) if callable(given) else given
-    return Joints(scene, points, tied, area, opposite, on_obstacle, pressure, spread)
+    return Joints(scene, points, tied, area, opposite, on_obstacle, pressure, spread, ratio)
