@@ -167,14 +167,14 @@ class Part:
         """Move the nodes of the mesh, which others may share, to where they are here."""
         _dolfinx.update_coordinates(self.mesh.space.mesh, self.mesh.by_input_node(self.points))
 
-    def _field(self, values: np.ndarray) -> Any:
+    def _field(self, values: np.ndarray) -> _dolfinx.fem.Function:
         space = _dolfinx.nodal_space_on(self.mesh.space.mesh, 1)
         nodes, dofs = _dolfinx.node_dofs(space)
         field = _dolfinx.fem.Function(space, name="s")
         field.x.array[dofs] = self.mesh.by_input_node(values)[nodes]
         return field
 
-    def _matrix(self, form: Any) -> sp.csr_matrix:
+    def _matrix(self, form: _dolfinx.fem.Form) -> sp.csr_matrix:
         indptr, indices, data = _dolfinx.assemble_csr(form)
         size = len(indptr) - 1  # facets alone may not reach the last columns
         matrix = self.mesh.matrix_of(Csr((data, indices, indptr), shape=(size, size)))

@@ -133,8 +133,8 @@ def test_a_heated_ball_in_a_hollow_one(slave: str):
     core = vessel + heat / (4.0 * np.pi * 5.0) * (1.0 - 1.0 / 2.0)
     hot, cold = (gap.slave, gap.master) if slave == "core" else (gap.master, gap.slave)
     assert (core, vessel) == pytest.approx((2232.13, 565.47), abs=0.01)
-    areas = gap.heat / gap.flux
-    assert np.average(hot, weights=areas) == pytest.approx(core, rel=3e-4)
-    assert np.average(cold, weights=areas) == pytest.approx(vessel, rel=3e-4)
-    assert cold == pytest.approx(vessel, rel=6e-3)
+    across = np.average(hot - cold, weights=gap.heat / gap.flux)
+    assert across == pytest.approx(core - vessel, rel=1e-6)
+    assert hot == pytest.approx(core, rel=2e-3)
+    assert cold == pytest.approx(vessel, rel=8e-3)  # of MOOSE's in space, too
     assert abs(gap.total) == pytest.approx(heat, rel=1e-9)
