@@ -7,7 +7,7 @@ another one gives, to rounding.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,44 +18,16 @@ import ufl
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.csr import Csr
-from fenics_contact._fem.load_forms import FIRST_COUNT
 from fenics_contact._fem.templates import LOADED, Template, Templates, Written, volume_measure
 from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.fields import Ufl
 from fenics_contact._surfaces.facets import quadrature_areas
-from fenics_contact.errors.kinds import user_code
 from fenics_contact.feti.subdomain import SubdomainMesh
-from fenics_contact.heat.properties import Conductor, Property, at_temperatures
+from fenics_contact.heat.properties import ByFunction, Conductor, Fields, Property
 from fenics_contact.heat.scene import ConductingBody, HeatScene
 
-
-@dataclass(frozen=True)
-class Symbols:
-    """A property as UFL: what is known as numbers, by fields at nodes, and by the temperature there."""
-
-    expression: Any
-    constants: tuple[ufl.Constant, ...]
-    coefficients: tuple[ufl.Coefficient, ...]
-
-
-def _symbols(given: Property, element: Element, number: int) -> Symbols:
-    """Return a property on the template; ``number`` distinguishes the fields of one form."""
-    if isinstance(given, float):
-        constant = element.constant()
-        return Symbols(constant, (constant,), ())
-    field = ufl.Coefficient(element.nodal, count=FIRST_COUNT + number)
-    if isinstance(given, Ufl):
-        with user_code("a property given as Ufl"):
-            return Symbols(ufl.as_ufl(given.function(element.x, field)), (), (field,))  # type: ignore[call-arg]
-    return Symbols(field, (), (field,))
-
-
-def _kind(given: Property) -> Hashable:
-    """Return what the form depends on."""
-    if isinstance(given, float):
-        return "number"
-    return given if isinstance(given, Ufl) else "field"
+#: A property that is given at nodes.
+FIELD = ByFunction("a nodal field", np.asarray)
 
 
 @dataclass(frozen=True)
@@ -67,73 +39,56 @@ class HeatForms:
     def prepare(self, scene: HeatScene) -> None:
         """Compile the missing forms. Collective."""
         for name, body in scene.field.bodies.items():
-            element = body.element
             for material in scene.bodies[name].materials:
-                self.conduction(material, element)
-                if isinstance(material.heat_capacity, Ufl):
-                    self.own_storage(material.heat_capacity, element)
-            self.storage(element)
-            self.exchange(element)
+                self.conduction(material, body.element)
+                for capacity in material.capacities:
+                    self.storage(capacity, body.element)
+            self.storage(FIELD, body.element)
+            self.exchange(body.element)
 
     def conduction(self, material: Conductor, element: Element) -> Template:
         """Return ∫ k ∇u·∇v over the marked cells."""
-        given, matrix = material.along_axes, material.matrix
-        kinds = tuple(_kind(each) for each in given) or ("matrix",)
+        given, shape = material.tensor.ravel(), material.tensor.shape
 
         def write() -> Written:
             V = element.displacements
-            u, v = ufl.TrialFunction(V)[0], ufl.TestFunction(V)[0]
-            if len(matrix):
-                constants = tuple(element.constant() for _ in range(matrix.size))
-                rows = np.array(constants, dtype=object).reshape(matrix.shape).tolist()
-                density = ufl.dot(ufl.dot(ufl.as_matrix(rows), ufl.grad(u)), ufl.grad(v))
-                return element.integrand(density) * volume_measure(element, 2)(LOADED), constants, ()
-            parts = [_symbols(each, element, number) for number, each in enumerate(given)]
-            if len(parts) == 1:
-                density = parts[0].expression * ufl.dot(ufl.grad(u), ufl.grad(v))
+            slope, along = ufl.grad(ufl.TrialFunction(V)[0]), ufl.grad(ufl.TestFunction(V)[0])
+            parts = [each.symbols(element, number) for number, each in enumerate(given)]
+            k = np.array([each.expression for each in parts], dtype=object).reshape(shape)
+            if len(shape) == 2:
+                slope = ufl.dot(ufl.as_matrix(k.tolist()), slope)
+            elif shape:
+                slope = ufl.as_vector([each * slope[axis] for axis, each in enumerate(k)])
             else:
-                density = sum(each.expression * u.dx(axis) * v.dx(axis) for axis, each in enumerate(parts))
+                slope = k.item() * slope
             constants = tuple(symbol for each in parts for symbol in each.constants)
             coefficients = tuple(symbol for each in parts for symbol in each.coefficients)
-            return element.integrand(density) * volume_measure(element, 2)(LOADED), constants, coefficients
+            density = element.integrand(ufl.dot(slope, along))
+            return density * volume_measure(element, 2)(LOADED), constants, coefficients
 
-        key = ("conduction", kinds, element)
+        key = ("conduction", tuple(each.kind for each in given), shape, element)
         return self.templates.get(key, ("conduction", element.name), write)
 
-    def storage(self, element: Element) -> Template:
-        """Return ∫ s u v over the marked cells."""
-
-        def write() -> Written:
-            V = element.displacements
-            s = ufl.Coefficient(element.nodal, count=FIRST_COUNT)
-            density = s * ufl.TrialFunction(V)[0] * ufl.TestFunction(V)[0]
-            return element.integrand(density) * volume_measure(element, 3)(LOADED), (), (s,)
-
-        return self.templates.get(("storage", element), ("storage", element.name), write)
-
-    def own_storage(self, capacity: Ufl, element: Element) -> Template:
-        """Return ∫ c(x, T) u v over the marked cells."""
-
-        def write() -> Written:
-            V, symbols = element.displacements, _symbols(capacity, element, 0)
-            density = symbols.expression * ufl.TrialFunction(V)[0] * ufl.TestFunction(V)[0]
-            measure = volume_measure(element, 3)(LOADED)
-            return element.integrand(density) * measure, (), symbols.coefficients
-
-        return self.templates.get(("storage", capacity, element), ("storage of UFL", element.name), write)
+    def storage(self, capacity: Property, element: Element) -> Template:
+        """Return ∫ c u v over the marked cells."""
+        name = ("storage", capacity.kind, element)
+        return self.templates.get(
+            name, ("storage", element.name), lambda: _product(capacity, element, volume_measure(element, 3))
+        )
 
     def exchange(self, element: Element) -> Template:
-        """Return ∫ s u v over the marked facets."""
+        """Return ∫ s u v over the marked facets, with a nodal field s."""
+        metadata = {"quadrature_degree": 3 * element.cell.order + 1}
+        measure = ufl.ds(domain=element.template, metadata=metadata)
+        return self.templates.get(
+            ("exchange", element), ("exchange", element.name), lambda: _product(FIELD, element, measure)
+        )
 
-        def write() -> Written:
-            V = element.displacements
-            s = ufl.Coefficient(element.nodal, count=FIRST_COUNT)
-            density = s * ufl.TrialFunction(V)[0] * ufl.TestFunction(V)[0]
-            metadata = {"quadrature_degree": 3 * element.cell.order + 1}
-            measure = ufl.ds(domain=element.template, metadata=metadata)(LOADED)
-            return element.integrand(density) * measure, (), (s,)
 
-        return self.templates.get(("exchange", element), ("exchange", element.name), write)
+def _product(given: Property, element: Element, measure: ufl.Measure) -> Written:
+    V, symbols = element.displacements, given.symbols(element, 0)
+    density = symbols.expression * ufl.TrialFunction(V)[0] * ufl.TestFunction(V)[0]
+    return element.integrand(density) * measure(LOADED), symbols.constants, symbols.coefficients
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,48 +140,30 @@ class Part:
         own = np.isin(self.mesh.cells, self.body.cells_of(number))
         return {LOADED: np.flatnonzero(own)}
 
-    def _bound(self, template: Template, given: Sequence[Property], name: str, at: np.ndarray) -> Any:
-        values = [each for each in given if isinstance(each, float)]
-        fields = [
-            self._field(at if isinstance(each, Ufl) else at_temperatures(name, each, at))
-            for each in given
-            if not isinstance(each, float)
-        ]
-        return values, fields
+    def _bound(self, template: Template, given: Sequence[Property], fields: Fields, number: int) -> Any:
+        """Return the matrix of a form on the cells of a material."""
+        values = [value for each in given for value in each.numbers]
+        functions = [self._field(each) for each in fields]
+        marked = self._marked(number)
+        return self._matrix(template.bind([self.mesh.space] * 2, values, functions, cells=marked))
 
     def conduction(self, temperature: np.ndarray) -> sp.csr_matrix:
         """Return ∫ k(T) ∇u·∇v, shape (n, n); assembles where `place` has put the nodes."""
-        total, spaces = None, [self.mesh.space] * 2
+        total = Csr((self.mesh.size, self.mesh.size))
         for number, material in enumerate(self.body.materials):
+            given = list(material.tensor.ravel())
+            fields = tuple(field for each in given for field in each.fields(temperature))
             template = self.forms.conduction(material, self.element)
-            values, fields = list(material.matrix.ravel()), []
-            if not len(values):
-                name = f"the conductivity of {self.name}"
-                values, fields = self._bound(template, material.along_axes, name, temperature)
-            form = template.bind(spaces, values, fields, cells=self._marked(number))
-            part = self._matrix(form)
-            total = part if total is None else total + part
-        assert total is not None
+            total = total + self._bound(template, given, fields, number)
         return total
 
     def capacity(self, before: np.ndarray, after: np.ndarray) -> sp.csr_matrix:
         """Return ∫ c u v with the mean c between two temperatures, so that C (T₂ − T₁) is what is stored."""
-        total, spaces = Csr((self.mesh.size, self.mesh.size)), [self.mesh.space] * 2
+        total = Csr((self.mesh.size, self.mesh.size))
         for number, material in enumerate(self.body.materials):
-            given = material.heat_capacity
-            if given is None:
-                continue
-            if isinstance(given, Ufl):
-                template, field = (
-                    self.forms.own_storage(given, self.element),
-                    self._field(0.5 * (before + after)),
-                )
-            else:
-                name = f"the heat capacity of {self.name}"
-                template = self.forms.storage(self.element)
-                field = self._field(_mean(name, given, before, after))
-            form = template.bind(spaces, (), [field], cells=self._marked(number))
-            total = total + self._matrix(form)
+            for each in material.capacities:
+                template, fields = self.forms.storage(each, self.element), each.mean_fields(before, after)
+                total = total + self._bound(template, [each], fields, number)
         return total
 
     def volume(self, values: np.ndarray, region: str) -> sp.csr_matrix:
@@ -234,7 +171,7 @@ class Part:
         own = self.mesh.cells
         here = np.isin(own, self.body.mesh.regions[region]) if region else np.ones(len(own), dtype=bool)
         marked = {LOADED: np.flatnonzero(here)}
-        template = self.forms.storage(self.element)
+        template = self.forms.storage(FIELD, self.element)
         return self._matrix(template.bind([self.mesh.space] * 2, (), [self._field(values)], cells=marked))
 
     def surface(self, values: np.ndarray, surface: str) -> sp.csr_matrix:
@@ -260,13 +197,3 @@ class Part:
             for cells in (whole.cells[mesh.cells], whole.cells)
         )
         return np.where(np.isin(mesh.nodes, whole.nodes_of(nodes)), own / every, 0.0)
-
-
-def _mean(name: str, given: Property, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return the mean of a property between two temperatures at each node, by Gauss's quadrature."""
-    if isinstance(given, float):
-        return np.full(before.shape, given)
-    places, weights = np.polynomial.legendre.leggauss(8)
-    between = before[:, None] + 0.5 * (places + 1.0) * (after - before)[:, None]
-    values = at_temperatures(name, given, between.ravel()).reshape(between.shape)
-    return np.asarray(0.5 * values @ weights)

@@ -15,7 +15,7 @@ from fenics_contact._scene.checks import check_known, check_not_negative, check_
 from fenics_contact._scene.fields import OfPosition, evaluate, finite_numbers
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.heat.exchange import Exchange, Place, given
-from fenics_contact.heat.properties import Property, TemperatureTable, at_temperatures, checked_property
+from fenics_contact.heat.properties import TemperatureTable, property_of
 from fenics_contact.mesh.body_mesh import BodyMesh
 
 #: A number, or a function of points, shape (n, dim) to (n,).
@@ -274,7 +274,7 @@ class Convection(Film):
 
     body: str
     surface: str
-    coefficient: Value | Property
+    coefficient: Value | TemperatureTable
     ambient: Value
 
     def __post_init__(self) -> None:
@@ -285,7 +285,7 @@ class Convection(Film):
             check_not_negative("Convection.coefficient", given, remedy)
             object.__setattr__(self, "coefficient", float(given))
         elif not callable(given):
-            checked_property("Convection.coefficient", given, "give a number, a function or a table")
+            property_of("Convection.coefficient", given, "give a number, a function or a table")
         object.__setattr__(self, "ambient", _checked("Convection.ambient", self.ambient))
 
     @property
@@ -306,7 +306,7 @@ class Convection(Film):
                     "the function"
                 )
         else:
-            h = at_temperatures("Convection.coefficient", given, temperature)
+            h = given.at(temperature)
         return h, h
 
 

@@ -2,22 +2,163 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from fenics_contact._base.checks import checked
+from fenics_contact._fem.load_forms import FIRST_COUNT
 from fenics_contact._scene.checks import check_positive
 from fenics_contact._scene.fields import Ufl, finite_numbers
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 
+if TYPE_CHECKING:
+    import ufl
+
+    from fenics_contact._kinematics.element import Element
+
+#: Values of fields at nodes, shape (n,) each.
+Fields: TypeAlias = tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
+class Symbols:
+    """A property as UFL, with its constants and coefficients."""
+
+    expression: Any
+    constants: tuple[ufl.Constant, ...] = ()
+    coefficients: tuple[ufl.Coefficient, ...] = ()
+
+
+class Property(ABC):
+    """A positive property of a material, such as its conductivity; by default its form has a nodal field."""
+
+    #: What forms depend on.
+    kind: Hashable = "field"
+    #: Whether it may depend on the temperature.
+    varies = True
+    #: Values of the constants of its form.
+    numbers: tuple[float, ...] = ()
+
+    def symbols(self, element: Element, number: int) -> Symbols:
+        """Return it on the template of an element; ``number`` distinguishes the properties of one form."""
+        import ufl
+
+        field = ufl.Coefficient(element.nodal, count=FIRST_COUNT + number)
+        return Symbols(field, (), (field,))
+
+    @abstractmethod
+    def at(self, temperature: np.ndarray) -> np.ndarray:
+        """Return its values at temperatures, of the same shape."""
+
+    def fields(self, temperature: np.ndarray) -> Fields:
+        """Return the fields of its form at temperatures of nodes, shape (n,)."""
+        return (self.at(temperature),)
+
+    def mean_fields(self, before: np.ndarray, after: np.ndarray) -> Fields:
+        """Return the fields of its mean between two temperatures at each node, by Gauss's quadrature."""
+        places, weights = np.polynomial.legendre.leggauss(8)
+        between = before[:, None] + 0.5 * (places + 1.0) * (after - before)[:, None]
+        return (np.asarray(0.5 * self.at(between) @ weights),)
+
+
+@dataclass(frozen=True)
+class Number(Property):
+    """The same at all temperatures."""
+
+    value: float
+    kind = "number"
+    varies = False
+
+    @property
+    def numbers(self) -> tuple[float, ...]:  # type: ignore[override]
+        """The number."""
+        return (self.value,)
+
+    def symbols(self, element: Element, number: int) -> Symbols:
+        """Return a constant."""
+        constant = element.constant()
+        return Symbols(constant, (constant,))
+
+    def at(self, temperature: np.ndarray) -> np.ndarray:
+        """Return the number."""
+        return np.full(temperature.shape, self.value)
+
+    def fields(self, temperature: np.ndarray) -> Fields:
+        """Return none."""
+        return ()
+
+    def mean_fields(self, before: np.ndarray, after: np.ndarray) -> Fields:
+        """Return none."""
+        return ()
+
+
+@dataclass(frozen=True)
+class ByFunction(Property):
+    """A function of temperatures."""
+
+    name: str
+    function: Callable[[np.ndarray], np.ndarray]
+
+    def at(self, temperature: np.ndarray) -> np.ndarray:
+        """Return what the function does, if that is positive."""
+        given = temperature.ravel()
+        with user_code(f"the function given as {self.name}"):
+            values = finite_numbers(self.function(given.copy()))
+        if values.shape != given.shape or not (values > 0.0).all():
+            least = f", the least is {values.min():g}" if values.shape == given.shape else ""
+            raise InvalidInputError(
+                f"{self.name} must be finite and positive at each temperature from {given.min():g} to "
+                f"{given.max():g}, got values of shape {values.shape}{least}: return one for each"
+            )
+        return values.reshape(temperature.shape)
+
+
+@dataclass(frozen=True)
+class ByUfl(Property):
+    """UFL of coordinates and temperature, evaluated at the points of the quadrature."""
+
+    name: str
+    given: Ufl
+
+    @property
+    def kind(self) -> Hashable:  # type: ignore[override]
+        """The function itself."""
+        return self.given
+
+    def symbols(self, element: Element, number: int) -> Symbols:
+        """Return what the function makes of coordinates and temperature."""
+        import ufl
+
+        field = ufl.Coefficient(element.nodal, count=FIRST_COUNT + number)
+        with user_code(f"the function given as {self.name}"):
+            expression = ufl.as_ufl(self.given.function(element.x, field))  # type: ignore[call-arg]
+        return Symbols(expression, (), (field,))
+
+    def at(self, temperature: np.ndarray) -> np.ndarray:
+        """Refuse: it is known in forms alone."""
+        raise InvalidInputError(
+            f"{self.name} is given as Ufl, of which there are no values outside of forms: give a function of "
+            "temperatures or a TemperatureTable"
+        )
+
+    def fields(self, temperature: np.ndarray) -> Fields:
+        """Return the temperature."""
+        return (temperature,)
+
+    def mean_fields(self, before: np.ndarray, after: np.ndarray) -> Fields:
+        """Return the temperature in the middle."""
+        return (0.5 * (before + after),)
+
 
 @dataclass(frozen=True)
 @checked()
-class TemperatureTable:
+class TemperatureTable(Property):
     """A property by temperature: straight between values, constant beyond the ends.
 
     Attributes:
@@ -29,7 +170,7 @@ class TemperatureTable:
 
     Example:
         >>> steel = TemperatureTable((20.0, 800.0), (54.0, 27.3))  # W/(m K)
-        >>> steel(np.array([410.0]))
+        >>> steel.at(np.array([410.0]))
         array([40.65])
     """
 
@@ -47,48 +188,34 @@ class TemperatureTable:
         object.__setattr__(self, "temperature", tuple(at.tolist()))
         object.__setattr__(self, "value", tuple(values.tolist()))
 
-    def __call__(self, temperature: np.ndarray) -> np.ndarray:
+    def at(self, temperature: np.ndarray) -> np.ndarray:
         """Return the property at temperatures, of the same shape."""
         return np.interp(temperature, self.temperature, self.value)
 
 
 #: A number, a table or a function of temperatures, or UFL of coordinates and temperature.
-Property: TypeAlias = float | TemperatureTable | Callable[[np.ndarray], np.ndarray] | Ufl
+GivenProperty: TypeAlias = float | Property | Callable[[np.ndarray], np.ndarray] | Ufl
 
 
-def checked_property(name: str, given: Property, remedy: str) -> Property:
-    """Return a property, a number as a float; reject numbers that are not positive."""
-    if isinstance(given, TemperatureTable):
-        if min(given.value) <= 0.0:
-            raise InvalidInputError(
-                f"{name} must be positive at all temperatures, got {min(given.value):g}: {remedy}"
-            )
-        return given
-    if callable(given) or isinstance(given, Ufl):
-        return given
-    check_positive(name, given, remedy)
-    return float(given)
-
-
-def varies(given: Property) -> bool:
-    """Return whether a property may depend on the temperature."""
-    return not isinstance(given, float)
-
-
-def at_temperatures(name: str, given: Property, temperature: np.ndarray) -> np.ndarray:
-    """Return positive values of a property that is no UFL at temperatures, shape (n,)."""
-    if isinstance(given, float):
-        return np.full(temperature.shape, given)
-    assert not isinstance(given, Ufl)
-    with user_code(f"the function given as {name}"):
-        values = finite_numbers(given(temperature.copy()))
-    if values.shape != temperature.shape or not (values > 0.0).all():
-        least = f", the least is {values.min():g}" if values.shape == temperature.shape else ""
+def property_of(name: str, given: Any, remedy: str) -> Property:
+    """Return what was given as a property; reject numbers that are not positive."""
+    if isinstance(given, TemperatureTable) and min(given.value) <= 0.0:
         raise InvalidInputError(
-            f"{name} must be finite and positive at each temperature from {temperature.min():g} to "
-            f"{temperature.max():g}, got values of shape {values.shape}{least}: return one for each"
+            f"{name} must be positive at all temperatures, got {min(given.value):g}: {remedy}"
         )
-    return values
+    if isinstance(given, Property):
+        return given
+    if isinstance(given, Ufl):
+        return ByUfl(name, given)
+    if callable(given):
+        return ByFunction(name, given)
+    if finite_numbers(given).shape != ():
+        raise InvalidInputError(
+            f"{name} must be a number, a TemperatureTable, a function of temperatures or Ufl, got {given!r}: "
+            f"{remedy}"
+        )
+    check_positive(name, given, remedy)
+    return Number(float(given))
 
 
 @dataclass(frozen=True)
@@ -113,73 +240,70 @@ class Conductor:
         >>> hot = Conductor(TemperatureTable((20.0, 800.0), (54.0, 27.3)))
     """
 
-    conductivity: Property | Sequence[Property] | np.ndarray
-    heat_capacity: Property | None = None
+    conductivity: GivenProperty | Sequence[GivenProperty] | np.ndarray
+    heat_capacity: GivenProperty | None = None
 
     def __post_init__(self) -> None:
         """Reject what does not conduct."""
-        given, remedy = self.conductivity, "steel has about 50 W/(m K), which is 0.05 W/(mm K)"
-        name = "Conductor.conductivity"
-        if not isinstance(given, TemperatureTable) and isinstance(given, Sequence | np.ndarray):
-            given = _tensor(name, given, remedy)
-        else:
-            given = checked_property(name, given, remedy)  # type: ignore[arg-type]
-        object.__setattr__(self, "conductivity", given)
-        if self.heat_capacity is not None:
-            remedy = "steel has about 3.7e6 J/(m³ K), which is 3.7e-3 J/(mm³ K)"
-            capacity = checked_property("Conductor.heat_capacity", self.heat_capacity, remedy)
-            object.__setattr__(self, "heat_capacity", capacity)
+        if isinstance(self.conductivity, Sequence | np.ndarray):
+            given = np.asarray(self.conductivity).tolist()
+            object.__setattr__(
+                self, "conductivity", tuple(tuple(x) if isinstance(x, list) else x for x in given)
+            )
+        _ = self.tensor, self.capacities
 
-    @property
-    def along_axes(self) -> tuple[Property, ...]:
-        """The conductivities along the axes, or the one in all directions."""
-        given = self.conductivity
-        if isinstance(given, tuple) and isinstance(given[0], tuple):
-            return ()
-        return given if isinstance(given, tuple) else (given,)  # type: ignore[return-value]
+    @cached_property
+    def tensor(self) -> np.ndarray:
+        """Conductivities as properties: one, shape (), one for each axis, (dim,), or a matrix, (dim, dim)."""
+        name, remedy = "Conductor.conductivity", "steel has about 50 W/(m K), which is 0.05 W/(mm K)"
+        given = np.empty((), dtype=object)
+        if not isinstance(self.conductivity, tuple):
+            given[()] = property_of(name, self.conductivity, remedy)
+            return given
+        given = np.array(self.conductivity, dtype=object)
+        if given.shape not in ((2,), (3,), (2, 2), (3, 3)):
+            raise InvalidInputError(
+                f"{name} must be one property, one for each axis or a matrix, got {self.conductivity!r}: "
+                "give 2 in the plane, 3 in space"
+            )
+        if given.ndim == 2:
+            _check_matrix(name, finite_numbers(self.conductivity), remedy)
+            return np.vectorize(lambda value: Number(float(value)), otypes=[object])(given)
+        return np.vectorize(lambda each: property_of(name, each, remedy), otypes=[object])(given)
 
-    @property
-    def matrix(self) -> np.ndarray:
-        """The matrix of conductivities where that was given, else none, (0, 0)."""
-        return np.array(self.conductivity) if not self.along_axes else np.zeros((0, 0))
+    @cached_property
+    def capacities(self) -> tuple[Property, ...]:
+        """The heat capacity as a property, nothing where it was not given."""
+        remedy = "steel has about 3.7e6 J/(m³ K), which is 3.7e-3 J/(mm³ K)"
+        given = self.heat_capacity
+        return () if given is None else (property_of("Conductor.heat_capacity", given, remedy),)
 
     @property
     def is_linear(self) -> bool:
         """Whether nothing depends on the temperature."""
-        capacity = () if self.heat_capacity is None else (self.heat_capacity,)
-        return not any(map(varies, (*self.along_axes, *capacity)))
+        return not any(each.varies for each in (*self.tensor.ravel(), *self.capacities))
 
     def conducted(self, temperature: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-        """Return k ∇T at points, shape (..., dim), by temperatures, (...), of properties that are no UFL."""
-        if not self.along_axes:
-            return gradient @ self.matrix
-        name, flat = "Conductor.conductivity", temperature.ravel()
-        k = [at_temperatures(name, each, flat).reshape(temperature.shape) for each in self.along_axes]
-        return gradient * (k[0][..., None] if len(k) == 1 else np.stack(k, axis=-1))
+        """Return k ∇T at points, shape (..., dim), by temperatures, (...)."""
+        k = np.array([each.at(temperature) for each in self.tensor.ravel()])
+        k = np.moveaxis(k, 0, -1).reshape(*temperature.shape, *self.tensor.shape)
+        if self.tensor.ndim == 2:
+            return np.asarray(np.einsum("...ij,...j->...i", k, gradient))
+        return gradient * (k if self.tensor.ndim else k[..., None])
 
     def typical(self, temperature: float) -> float:
         """Return a conductivity for comparison with those of other bodies."""
-        if not self.along_axes:
-            return float(np.trace(self.matrix)) / len(self.matrix)
-        at = np.array([temperature])
-        known = [k for k in self.along_axes if not isinstance(k, Ufl)]
-        values = [float(at_temperatures("Conductor.conductivity", k, at)[0]) for k in known]
-        return float(np.mean(values)) if values else 1.0
+        main = self.tensor.ravel() if self.tensor.ndim < 2 else self.tensor.diagonal()
+        known = [each for each in main if not isinstance(each, ByUfl)]
+        return float(np.mean([each.at(np.array(temperature)) for each in known])) if known else 1.0
 
 
-def _tensor(name: str, given: Sequence[Property] | np.ndarray, remedy: str) -> Any:
-    numbers = finite_numbers(given)
-    if numbers.ndim == 2 and numbers.shape in ((2, 2), (3, 3)):
-        values = np.linalg.eigvalsh(0.5 * (numbers + numbers.T))
-        if not np.allclose(numbers, numbers.T, rtol=1e-12, atol=0.0) or values[0] <= 0.0:
-            raise InvalidInputError(
-                f"{name} must be a symmetric matrix with positive eigenvalues, got {numbers.tolist()}, which "
-                f"has {values.tolist()}: {remedy}"
-            )
-        return tuple(map(tuple, numbers.tolist()))
-    if len(given) not in (2, 3) or (numbers.ndim == 2):
+def _check_matrix(name: str, matrix: np.ndarray, remedy: str) -> None:
+    """Reject a matrix that is not symmetric and positive."""
+    square = matrix.ndim == 2
+    values = np.linalg.eigvalsh(0.5 * (matrix + matrix.T)) if square else np.zeros(1)
+    if not square or not np.allclose(matrix, matrix.T, rtol=1e-12, atol=0.0) or values[0] <= 0.0:
         raise InvalidInputError(
-            f"{name} must be one property, one for each axis or a matrix, got {given!r}: give 2 in the "
-            "plane, 3 in space"
+            f"{name} must be a symmetric matrix of numbers with positive eigenvalues, got {matrix.tolist()}, "
+            f"with {values.tolist()}: {remedy}"
         )
-    return tuple(checked_property(name, each, remedy) for each in given)

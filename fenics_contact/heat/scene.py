@@ -121,8 +121,8 @@ class ConductingBody:
                 f"mesh has {sorted(self.mesh.regions)}: give one for each, or one for the whole body"
             )
         for each in self.materials:
-            size = len(each.matrix) or len(each.along_axes)
-            if size not in (1, self.mesh.dim) or (size == 1 and len(each.matrix)):
+            size = len(each.tensor) if each.tensor.ndim else self.mesh.dim
+            if size != self.mesh.dim:
                 raise InvalidInputError(
                     f"a conductivity must be one, or have {self.mesh.dim} axes in this body, got {size}: "
                     f"give {self.mesh.dim}"
