@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isnan, nan
 from typing import Any, ClassVar, Self
@@ -309,7 +309,13 @@ class HeatScene:
             return Body(given.mesh, stand_in, axisymmetric=given.axisymmetric)
 
         bodies = {name: body(each) for name, each in self.bodies.items()}
-        return Scene(bodies, contacts=[each.pair for each in self.contacts], ties=list(self.ties))
+        found = Scene(bodies, contacts=[each.pair for each in self.contacts], ties=list(self.ties))
+        if not any(pair.choice.exchanged for pair in found.contacts):
+            return found
+        # A corner that presses is better as the slave; heat goes from the given slave to its master.
+        chosen = zip(self.contacts, found.contacts, strict=True)
+        kept = [replace(each.pair, discretisation=pair.discretisation) for each, pair in chosen]
+        return replace(found, contacts=kept)
 
     @cached_property
     def field(self) -> Scene:

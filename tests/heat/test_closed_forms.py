@@ -67,3 +67,22 @@ def test_a_block_gives_heat_to_an_obstacle_of_known_temperature():
     state = solve_heat(scene, MPI.COMM_SELF)
     assert state.contacts[0].slave == pytest.approx(54.5455, abs=5e-5)
     assert state.contacts[0].flux == pytest.approx(45.4545, abs=5e-5)
+
+
+def test_heat_goes_from_the_given_slave_though_the_master_has_the_corner():
+    lower, upper = rectangle((0.0, 0.0), (4.0, 1.0), (16, 2)), rectangle((0.0, 0.0), (1.0, 1.0), (4, 2))
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    bodies = {
+        "lower": ConductingBody(lower, Conductor(1.0)),
+        "upper": ConductingBody(upper.reshaped(upper.points @ turn + (1.5, 1.2)), Conductor(1.0)),
+    }
+    held = [HeldTemperature("lower", "y0", 0.0), HeldTemperature("upper", "y1", 100.0)]
+    sides = Surface("lower", "y1"), Surface("upper", "y0")
+    totals = []
+    for slave, master in (sides, sides[::-1]):
+        scene = HeatScene(bodies, held, contacts=[ThermalContact(slave, master, 1.0)])
+        (joint,) = solve_heat(scene, MPI.COMM_SELF).contacts
+        assert np.isin(joint.nodes, bodies[slave.body].mesh.nodes_of(slave.name)).all()
+        assert np.sign(joint.slave - joint.master) == pytest.approx(np.sign(joint.heat))
+        totals.append(joint.total)
+    assert totals[0] < 0.0 < totals[1]
