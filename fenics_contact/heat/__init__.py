@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         PressureConductance,
         harmonic_mean,
     )
+    from fenics_contact.heat.friction import FrictionHeat, effusivity_share
     from fenics_contact.heat.parts import (
         Convection,
         HeatAtNodes,
@@ -34,6 +35,7 @@ __all__ = [
     "Conductor",
     "Convection",
     "EvenConductance",
+    "FrictionHeat",
     "GapConductance",
     "GapRadiation",
     "HeatAtNodes",
@@ -49,6 +51,7 @@ __all__ = [
     "Radiation",
     "TemperatureTable",
     "ThermalContact",
+    "effusivity_share",
     "harmonic_mean",
     "solve_heat",
 ]

@@ -65,10 +65,13 @@ class Assembly:
         nothing = np.zeros(self.part.mesh.size)
         return self.part.capacity(nothing, nothing)
 
-    def heated(self, scene: HeatScene, temperature: np.ndarray, rate: Rate, number: int) -> Heated:
+    def heated(
+        self, scene: HeatScene, temperature: np.ndarray, rate: Rate, number: int, friction: np.ndarray
+    ) -> Heated:
         """Return the subdomain at temperatures of the nodes of its body, (n_nodes,).
 
-        `number`: that of the subdomain on this rank.
+        `number`: that of the subdomain on this rank; `friction`: heat that enters at the nodes of the body,
+        (n_nodes,), [power].
         """
         part, linear = self.part, self.part.body.is_linear
         part.place()
@@ -78,7 +81,7 @@ class Assembly:
         stored = self._stored(rate, temperature[nodes], rate.before[nodes], number)
         bed = sum((each.matrix for each in exchanges.values()), stored.matrix)
         key = tuple(id(each.matrix) for each in (*exchanges.values(), stored) if each.matrix.nnz)
-        load = sum((each.load for each in exchanges.values()), stored.load)
+        load = sum((each.load for each in exchanges.values()), stored.load + part.portion * friction[nodes])
         if not np.isfinite(load).all():
             raise InvalidInputError(f"heat on {part.name} must be finite, got {load}: check loads and laws")
         if not linear or self._last is None or self._last[0] != key:

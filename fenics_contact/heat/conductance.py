@@ -36,6 +36,10 @@ class Touch:
         """Return that of some points, by indices."""
         return Touch(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
+    def part(self, chosen: np.ndarray) -> Touch:
+        """Return that of some of the points, by indices."""
+        return Touch(*(getattr(self, each.name)[chosen] for each in fields(self)))
+
 
 class Conductance(ABC):
     """A law of heat that passes between surfaces, q = h (T_slave − T_master), for one of your own.
@@ -72,6 +76,11 @@ class SummedConductance(Conductance):
     def by_temperature(self) -> bool:  # type: ignore[override]
         """Whether one of them depends on temperatures."""
         return any(each.by_temperature for each in self.parts)
+
+    @property
+    def by_contact(self) -> bool:  # type: ignore[override]
+        """Whether one of them depends on pressures or gaps."""
+        return any(each.by_contact for each in self.parts)
 
     def at(self, touch: Touch) -> np.ndarray:
         """Return the sum of all."""
@@ -281,6 +290,7 @@ class GapRadiation(Conductance):
     """
 
     by_temperature = True
+    by_contact = False
     slave_emissivity: float
     master_emissivity: float
     absolute_zero: float = 0.0

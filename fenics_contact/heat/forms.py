@@ -190,10 +190,16 @@ class Part:
         return self.body.thickness * plane
 
     def share(self, nodes: str) -> np.ndarray:
-        """Return its share in some nodes of the body: that of its cells among those at each, shape (n,)."""
+        """Return its share in some nodes of the body, shape (n,)."""
+        here = np.isin(self.mesh.nodes, self.body.mesh.nodes_of(nodes))
+        return np.where(here, self.portion, 0.0)
+
+    @cached_property
+    def portion(self) -> np.ndarray:
+        """Its portion of what enters at each node: that of its cells among those there, shape (n,)."""
         mesh, whole = self.mesh, self.body.mesh
         own, every = (
             np.bincount(cells.ravel(), minlength=whole.n_nodes)[mesh.nodes]
             for cells in (whole.cells[mesh.cells], whole.cells)
         )
-        return np.where(np.isin(mesh.nodes, whole.nodes_of(nodes)), own / every, 0.0)
+        return np.asarray(own / every)

@@ -83,6 +83,18 @@ class Joints:
             h[mine] = values
         return h
 
+    def friction(self, touch: Touch, work: np.ndarray) -> np.ndarray:
+        """Return the heat of friction that enters the slave and the master at the points, (2, n), [power].
+
+        `work`: that of friction in mechanics, (n,), [power / length²].
+        """
+        heat = np.zeros((2, self.points.count))
+        for number, contact in enumerate(self.scene.contacts):
+            mine, law = np.flatnonzero(self.points.pair == number), contact.friction
+            flux = law.at(self.places[mine], touch.part(mine), work[mine])
+            heat[:, mine] = np.outer((law.share, 1.0 - law.share), self.area[mine] * flux)
+        return heat
+
     @property
     def places(self) -> np.ndarray:
         """Where the slave nodes of the points are, (n, dim)."""

@@ -38,10 +38,14 @@ TOLERANCE = 1e-11
 
 @dataclass(frozen=True, eq=False)
 class GivenContact:
-    """What mechanics gives to the points of contacts: pressures and gaps, (n,) each."""
+    """What mechanics gives to the points of contacts, (n,) each: pressures, gaps, work of friction.
+
+    `work`: per area and time, [power / length²].
+    """
 
     pressure: np.ndarray
     gap: np.ndarray
+    work: np.ndarray
 
 
 @displayed
@@ -72,6 +76,7 @@ class HeatProblem:
         self._partitions = partitions
         self._decomposition: Decomposition | None = None
         self._assemblies: tuple[Assembly, ...] = ()
+        self._joints: Joints | None = None
 
     @property
     def decomposition(self) -> Decomposition:
@@ -115,12 +120,24 @@ class HeatProblem:
         scene = scene or self.scene
         decomposition = self.decomposition.holding(scene.field)
         HeatForms(decomposition.forms.templates).prepare(scene)
-        with self.timer.phase("pair"):
-            joints = Joints.of(scene, decomposition)
+        joints = self.joints(scene)
         iteration = _Iteration(self, scene, decomposition, joints, rate or self.no_rate,
-                               given or GivenContact(joints.pressure, joints.points.gap))  # fmt: skip
+                               given or as_given(joints))  # fmt: skip
         self.state = iteration.run(self.state, most)
         return self.state
+
+    def joints(self, scene: HeatScene) -> Joints:
+        """Return the points of contacts and ties of a scene, those of the last one again. Collective."""
+        decomposition = self.decomposition.holding(scene.field)
+        if self._joints is None or self._joints.scene is not scene:
+            with self.timer.phase("pair"):
+                self._joints = Joints.of(scene, decomposition)
+        return self._joints
+
+
+def as_given(joints: Joints) -> GivenContact:
+    """Return pressures and gaps as a scene has them before mechanics moves anything."""
+    return GivenContact(joints.pressure, joints.points.gap, np.zeros(joints.points.count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,11 +181,12 @@ class _Iteration:
     def _linear(self, guess: np.ndarray, last: HeatState | None, count: int, products: int) -> HeatState:
         """Solve the system linearised at temperatures. Collective."""
         problem, decomposition, timer = self.problem, self.decomposition, self.problem.timer
-        with timer.phase("assemble"), together(decomposition.comm):
-            heated = tuple(self._heated(guess))
         touch = self.joints.touch(guess, self.given.pressure, self.given.gap)
         with together(decomposition.comm):
             conductance = self.joints.conductance(touch)
+            friction = self.joints.friction(touch, self.given.work)
+        with timer.phase("assemble"), together(decomposition.comm):
+            heated = tuple(self._heated(guess, friction))
         torn = self._torn(heated, self.joints.rows(conductance), last)
         system = DualSystem(torn, timer, previous=None if last is None else last.system)
         with timer.phase("solve"):
@@ -177,16 +195,17 @@ class _Iteration:
                 start = last.solution.multiplier
             solution = solve_dual(system, ProjectedCG(tolerance=problem.tolerance), start)
             field = system.displacement(solution.multiplier, solution.alpha)
-        return self._state(system, solution, field, heated, conductance, (count, products))
+        return self._state(system, solution, field, heated, conductance, friction, (count, products))
 
-    def _heated(self, guess: np.ndarray) -> Iterator[Heated]:
-        tearing = self.decomposition.tearing
+    def _heated(self, guess: np.ndarray, friction: np.ndarray) -> Iterator[Heated]:
+        tearing, points = self.decomposition.tearing, self.joints.points
+        rubbed = points.own.T @ friction[0] + points.master.T @ friction[1]
         for number, assembly in enumerate(self.problem._assemblies):
             name = assembly.part.mesh.body
             first = tearing.first_of(name)
             own = slice(first, first + self.scene.bodies[name].mesh.n_nodes)
             rate = Rate(self.rate.factor, self.rate.before[own], self.rate.history)
-            yield assembly.heated(self.scene, guess[own], rate, number)
+            yield assembly.heated(self.scene, guess[own], rate, number, rubbed[own])
 
     def _torn(
         self,
@@ -214,6 +233,7 @@ class _Iteration:
         field: np.ndarray,
         heated: tuple[Heated, ...],
         conductance: np.ndarray,
+        friction: np.ndarray,
         counts: tuple[int, int],
     ) -> HeatState:
         """Return the state of a solution. Collective."""
@@ -222,15 +242,15 @@ class _Iteration:
         tied, passing = (torn.gathered(solution.multiplier, group) for group in torn.groups.joints)
         heat = np.zeros(self.joints.points.count)
         heat[conductance * self.joints.area > 0.0] = passing
-        balance = self._balance(torn, solution, field, heated, heat)
+        balance = self._balance(torn, solution, field, heated, heat, friction)
         return HeatState(
             self.scene, torn, system, solution, self.joints, values,
-            self._contacts(values, conductance, heat), tied, balance, counts[0], counts[1] + system.products,
-            dict(self.problem.timer.seconds),
+            self._contacts(values, conductance, heat, friction.sum(axis=0)), tied, balance,
+            counts[0], counts[1] + system.products, dict(self.problem.timer.seconds),
         )  # fmt: skip
 
     def _contacts(
-        self, values: np.ndarray, conductance: np.ndarray, heat: np.ndarray
+        self, values: np.ndarray, conductance: np.ndarray, heat: np.ndarray, friction: np.ndarray
     ) -> tuple[HeatThroughContact, ...]:
         joints, found = self.joints, []
         slave, master = joints.sides(values)
@@ -240,7 +260,7 @@ class _Iteration:
             found.append(
                 HeatThroughContact(
                     joints.points.slave[mine] - first, joints.places[mine], slave[mine], master[mine],
-                    conductance[mine], heat[mine], heat[mine] / joints.area[mine],
+                    conductance[mine], heat[mine], heat[mine] / joints.area[mine], friction[mine],
                 )
             )  # fmt: skip
         return tuple(found)
@@ -252,6 +272,7 @@ class _Iteration:
         field: np.ndarray,
         heated: tuple[Heated, ...],
         heat: np.ndarray,
+        friction: np.ndarray,
     ) -> HeatBalance:
         """Return where heat comes from. Collective."""
         scene, comm = self.scene, self.decomposition.comm
@@ -270,6 +291,10 @@ class _Iteration:
             mine = (self.joints.points.pair == number) & self.joints.on_obstacle
             if mine.any():
                 parts[f"ThermalContact {contact.place}"] = -float(heat[mine].sum())
+            if contact.friction.part > 0.0:
+                slave, master = friction[:, self.joints.points.pair == number].sum(axis=1)
+                entering_master = float(master) * contact.pair.between_bodies
+                parts[f"FrictionHeat {contact.place}"] = float(slave) + entering_master
         return HeatBalance(parts, float(entering[-1]))
 
     def _add_held(self, entering: np.ndarray, torn: TornSystem, solution: DualSolution) -> None:

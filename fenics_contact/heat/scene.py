@@ -24,6 +24,7 @@ from fenics_contact._scene.supports import Support
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.heat.conductance import AnyConductance, Conductance, EvenConductance
+from fenics_contact.heat.friction import NO_FRICTION_HEAT, FrictionHeat
 from fenics_contact.heat.parts import HeatLoad, HeldTemperature, Value
 from fenics_contact.heat.properties import Conductor
 from fenics_contact.materials.elastic import IsotropicElasticity, PlaneStrain
@@ -180,6 +181,7 @@ class ThermalContact:
             points, [force / length²].
         discretisation: "node", "mortar" or "best", as in `ContactPair`.
         geometry: As in `ContactPair`.
+        friction: Heat that arises where the surfaces slide; none by default.
 
     Raises:
         InvalidInputError: If an obstacle has no temperature, or a body has one, or a pressure is negative.
@@ -195,6 +197,7 @@ class ThermalContact:
     pressure: Value = 0.0
     discretisation: AnyDiscretisation = "best"
     geometry: Geometry = "best"
+    friction: FrictionHeat = NO_FRICTION_HEAT
 
     def __post_init__(self) -> None:
         """Reject obstacles without a temperature."""
@@ -336,7 +339,7 @@ class HeatScene:
     @property
     def is_linear(self) -> bool:
         """Whether nothing depends on the temperature."""
-        laws = any(each.law.by_temperature for each in self.contacts)
+        laws = any(each.law.by_temperature or each.friction.by_temperature for each in self.contacts)
         bodies = all(body.is_linear for body in self.bodies.values())
         return bodies and not laws and all(each.is_linear for each in self.loads)
 

@@ -31,6 +31,7 @@ class HeatThroughContact:
         conductance: h, shape (n,), [power / (length² · degree)].
         heat: Heat that passes from the slave to the master at each point, shape (n,), [power].
         flux: The same per area, shape (n,), [power / length²].
+        friction: Heat of friction that enters both sides there, shape (n,), [power].
     """
 
     nodes: np.ndarray
@@ -40,6 +41,7 @@ class HeatThroughContact:
     conductance: np.ndarray
     heat: np.ndarray
     flux: np.ndarray
+    friction: np.ndarray
 
     @property
     def total(self) -> float:
