@@ -13,12 +13,12 @@ from fenics_contact.errors import InvalidInputError
 if TYPE_CHECKING:
     from fenics_contact._page.page import Page
     from fenics_contact.pictures.canvas import Units
-    from fenics_contact.results.state import State
+    from fenics_contact.results.on_bodies import OnBodies
 
 
 @naming_arguments
 def result_page(
-    result: State | Mapping[str, State] | str | Path,
+    result: OnBodies | Mapping[str, OnBodies] | str | Path,
     path: str | Path | None = None,
     *,
     field: str = "",

@@ -43,8 +43,8 @@ from fenics_contact.pictures.section import (
 )
 from fenics_contact.pictures.states import chosen_scale
 from fenics_contact.results.multi_block import hanging_of
+from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.revolved import check_turned, turned_around
-from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
     import pyvista
@@ -404,9 +404,9 @@ class Source:
         return replace(self, steps=steps)
 
 
-def source_of_states(states: Mapping[str, State]) -> Source:
+def source_of_states(states: Mapping[str, OnBodies]) -> Source:
     """Return the fields of states by name and the record of the last one. Collective."""
-    strange = [type(state).__name__ for state in states.values() if not isinstance(state, State)]
+    strange = [type(state).__name__ for state in states.values() if not isinstance(state, OnBodies)]
     if strange or not states:
         raise InvalidInputError(
             f"a page needs a state, states by name, or a file, got {', '.join(strange) or 'none'}"
@@ -416,7 +416,7 @@ def source_of_states(states: Mapping[str, State]) -> Source:
         blocks = state.to_pyvista()
         steps.append((name, {body: blocks[body] for body in blocks.keys()}))
     last = list(states.values())[-1]
-    return Source(steps, json.loads(json_text(result_record(last))), comm=last.torn.decomposition.comm)
+    return Source(steps, json.loads(json_text(result_record(last))), comm=last.comm)
 
 
 def source_of_files(path: Path) -> Source:
@@ -472,9 +472,9 @@ class Page:
         return {"text/html": _FRAME.format(page=escape(self.html)), "text/plain": str(self)}
 
 
-def source_of(result: State | Mapping[str, State] | str | Path, revolved: float) -> Source:
+def source_of(result: OnBodies | Mapping[str, OnBodies] | str | Path, revolved: float) -> Source:
     """Return where a page's content comes from, turned around the axis by some degrees."""
-    if isinstance(result, State):
+    if isinstance(result, OnBodies):
         result = {"": result}
     source = source_of_states(result) if isinstance(result, Mapping) else source_of_files(Path(result))
     return source.turned(revolved) if revolved else source

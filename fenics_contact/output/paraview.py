@@ -25,7 +25,7 @@ from fenics_contact.mesh.collapsed import by_shape
 from fenics_contact.output.files import replacing, replacing_together, write_text
 from fenics_contact.results.fields import in_space
 from fenics_contact.results.multi_block import vtk_nodes
-from fenics_contact.results.state import State
+from fenics_contact.results.on_bodies import OnBodies
 
 if TYPE_CHECKING:
     import meshio
@@ -187,10 +187,10 @@ _MESHIO_SHAPES = {
 }  # fmt: skip
 
 
-@collectively("write_vtu", lambda state, *_, **__: state.torn.decomposition.comm)
+@collectively("write_vtu", lambda state, *_, **__: state.comm)
 @naming_arguments
 def write_vtu(
-    state: State,
+    state: OnBodies,
     folder: str | Path,
     name: str = "state",
     *,
@@ -218,10 +218,10 @@ def write_vtu(
     import meshio  # takes a tenth of a second
 
     index = checked_name(folder, name, ".vtm")
-    more = {body: _checked(state, body, cell_fields or {}) for body in state.scene.deforming}
-    meshes = {body: _gathered(state, body, more[body]) for body in state.scene.deforming}
+    more = {body: _checked(state, body, cell_fields or {}) for body in state.geometry.deforming}
+    meshes = {body: _gathered(state, body, more[body]) for body in state.geometry.deforming}
     files = list(file_of_each(meshes, index.parent, name, ".vtu").values())
-    comm = state.torn.decomposition.comm
+    comm = state.comm
     with together(comm):
         if comm.rank == 0:
             # The index last: when it exists, so do its files.
@@ -233,9 +233,9 @@ def write_vtu(
 
 
 def _checked(
-    state: State, body: str, fields: Mapping[str, Mapping[str, np.ndarray]]
+    state: OnBodies, body: str, fields: Mapping[str, Mapping[str, np.ndarray]]
 ) -> dict[str, np.ndarray]:
-    count, arrays = state.scene.bodies[body].mesh.n_cells, {}
+    count, arrays = state.geometry.bodies[body].mesh.n_cells, {}
     for name, values in fields.items():
         arrays[name] = np.asarray(values[body]) if body in values else np.zeros(0)
         if arrays[name].shape[:1] != (count,):
@@ -246,8 +246,8 @@ def _checked(
     return arrays
 
 
-def _gathered(state: State, body: str, more: Mapping[str, np.ndarray]) -> meshio.Mesh:
-    mesh = state.scene.bodies[body].mesh
+def _gathered(state: OnBodies, body: str, more: Mapping[str, np.ndarray]) -> meshio.Mesh:
+    mesh = state.geometry.bodies[body].mesh
     fields = state.gather_fields(body)
     import meshio
 
@@ -278,9 +278,9 @@ def _multi_block(bodies: list[str], files: list[Path]) -> str:
     )
 
 
-@collectively("write_xdmf", lambda state, *_, **__: state.torn.decomposition.comm)
+@collectively("write_xdmf", lambda state, *_, **__: state.comm)
 @naming_arguments
-def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
+def write_xdmf(state: OnBodies, path: str | Path) -> dict[str, Path]:
     """Write displacement and von Mises stress of every body to XDMF, all ranks together. Collective.
 
     The data are in HDF5 files beside them. ParaView opens them with its "Xdmf3 Reader S".
@@ -300,9 +300,9 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
     base = Path(path)
     if base.suffix != ".xdmf":
         raise InvalidInputError(f"the file must be an XDMF file, got the name {base.name!r}: use .xdmf")
-    files = file_of_each(state.scene.deforming, base.parent, base.stem, ".xdmf")
+    files = file_of_each(state.geometry.deforming, base.parent, base.stem, ".xdmf")
     for name, target in files.items():
-        _write_xdmf(state.torn.decomposition.comm, target, state.displacement[name], state.von_mises[name])
+        _write_xdmf(state.comm, target, state.functions(name))
     return files
 
 
@@ -311,15 +311,13 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
 _XINCLUDE, _UNKNOWN = "http://www.w3.org/2001/XInclude", "https://www.w3.org/2001/XInclude"
 
 
-def _write_xdmf(
-    comm: MPI.Comm, target: Path, displacement: _dolfinx.fem.Function, von_mises: _dolfinx.fem.Function
-) -> None:
-    mesh = displacement.function_space.mesh
+def _write_xdmf(comm: MPI.Comm, target: Path, fields: list[_dolfinx.fem.Function]) -> None:
+    mesh = fields[0].function_space.mesh
     # The XDMF file names its HDF5 file: both keep their names and are written in a separate folder.
     replacing_together(
         comm,
         [target.with_suffix(".h5"), target],
-        lambda hidden: _dolfinx.write_xdmf(hidden / target.name, mesh, [displacement, von_mises]),
+        lambda hidden: _dolfinx.write_xdmf(hidden / target.name, mesh, fields),
         size=parallel_size(mesh),
         repair=lambda hidden: _repair(hidden / target.name),
     )
@@ -399,7 +397,7 @@ class ResultSeries:
 
     def add(
         self,
-        state: State,
+        state: OnBodies,
         value: float,
         label: str = "",
         *,

@@ -12,7 +12,7 @@ import platform
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
-from functools import partial
+from functools import partial, singledispatch
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
@@ -42,6 +42,7 @@ from fenics_contact.results.contact import Status, worn_from
 from fenics_contact.results.forces import Resultant
 from fenics_contact.results.joints import joint_results
 from fenics_contact.results.linear_state import as_linear
+from fenics_contact.results.on_bodies import OnBodies, Recorded
 from fenics_contact.results.rigid_motions import UnheldMotion
 from fenics_contact.results.state import State
 
@@ -241,10 +242,10 @@ UNITS = (
 )
 
 
-@collectively("write_result", lambda state, *_, **__: state.torn.decomposition.comm)
+@collectively("write_result", lambda state, *_, **__: state.comm)
 @naming_arguments
 def write_result(
-    state: State,
+    state: OnBodies,
     folder: str | Path,
     *,
     name: str = "result",
@@ -316,7 +317,7 @@ contact on it |
     Example:
         >>> write_result(state, "output", more={"drop_percent": 12.4})  # doctest: +SKIP
     """
-    comm = state.torn.decomposition.comm
+    comm = state.comm
     with together(comm):
         target = checked_name(folder, name, ".json")
     record = result_record(state, more=more, errors=errors)
@@ -325,17 +326,29 @@ contact on it |
     return write_json(target, record, comm=comm)
 
 
-@collectively("result_record", lambda state, *_, **__: state.torn.decomposition.comm)
+@collectively("result_record", lambda state, *_, **__: state.comm)
 def result_record(
-    state: State, *, more: Mapping[str, Any] | None = None, errors: bool = False
+    state: OnBodies, *, more: Mapping[str, Any] | None = None, errors: bool = False
 ) -> dict[str, Any]:
     """Return what `write_result` writes, with its arguments. Collective."""
-    comm, unheld, read_off = state.torn.decomposition.comm, state.unheld, _read_off(state)
+    return {**_record(state, errors), "more": dict(more or {})}
+
+
+@singledispatch
+def _record(state: Any, errors: bool) -> dict[str, Any]:
+    """Return head and parts of the record of a result, by default one that is `Recorded`. Collective."""
+    result: Recorded = state
+    return {**_head(result.kind, result.comm), **readable(result.record())}
+
+
+@_record.register
+def _(state: State, errors: bool) -> dict[str, Any]:
+    comm, unheld, read_off = state.comm, state.unheld, _read_off(state)
     with together(comm):
         record = {**_head("state", comm), **_state_record(state, unheld), **read_off}
     found = as_linear(state, "errors").estimate_errors() if errors else state.known_errors
     record["errors"] = None if found is None else _errors(found)
-    return {**record, "more": dict(more or {})}
+    return record
 
 
 @collectively("write_optimisation_result", lambda result, problem, *_, **__: problem.comm)

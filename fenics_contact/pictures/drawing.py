@@ -56,8 +56,8 @@ from fenics_contact.pictures.section import (
     sections_of,
 )
 from fenics_contact.pictures.unrolled import label_axes
+from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.revolved import turned_around
-from fenics_contact.results.state import State
 from fenics_contact.shapes.combined import placed, simplified
 from fenics_contact.shapes.rounded import Box
 from fenics_contact.shapes.simple import Cylinder, Plane, Revolved, Sphere, SurfaceShape
@@ -76,17 +76,17 @@ PIECES = 96
 BORDER = 0.06
 
 
-def obstacles_of(state: State) -> list[SurfaceShape]:
+def obstacles_of(state: OnBodies) -> list[SurfaceShape]:
     """Return the different rigid obstacles of a scene, where they are in a state of it."""
     obstacles: list[RigidObstacle] = []
-    for pair in state.scene.contacts:
+    for pair in state.geometry.contacts:
         if not pair.between_bodies and pair.obstacle not in obstacles:
             obstacles.append(pair.obstacle)
     return [simplified(_where_it_is(each, state)) for each in obstacles]
 
 
 @singledispatch
-def _where_it_is(obstacle: Any, state: State) -> SurfaceShape:
+def _where_it_is(obstacle: Any, state: OnBodies) -> SurfaceShape:
     """Return an obstacle where it is in a state. Collective."""
     shape: SurfaceShape = obstacle
     return shape
@@ -96,7 +96,7 @@ _where_it_is.register(MovingObstacle, lambda obstacle, state: obstacle.at(state.
 
 
 @_where_it_is.register(RigidTool)
-def _(obstacle: RigidTool, state: State) -> SurfaceShape:
+def _(obstacle: RigidTool, state: OnBodies) -> SurfaceShape:
     motion = state.tools()[obstacle.name]
     return tool_at(obstacle.shape, np.array(obstacle.at), motion.rotation, motion.displacement)
 

@@ -32,6 +32,7 @@ from fenics_contact.pictures.canvas import (
 from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.fields import STRESS_COMPONENTS
 from fenics_contact.results.multi_block import hanging_of, vtk_nodes
+from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.state import State
 
 #: Drawn bodies by name.
@@ -39,7 +40,7 @@ Bodies = Mapping[str, pv.UnstructuredGrid]
 Drawn = TypeVar("Drawn")
 
 
-def drawn_bodies(state: State) -> dict[str, pv.UnstructuredGrid]:
+def drawn_bodies(state: OnBodies) -> dict[str, pv.UnstructuredGrid]:
     """Return the undeformed bodies, with linear cells and all fields. Collective."""
     blocks = state.to_pyvista(linear=True)
     return {name: blocks[name] for name in blocks.keys()}

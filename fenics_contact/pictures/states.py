@@ -80,8 +80,9 @@ from fenics_contact.pictures.unrolled import (
 from fenics_contact.results.fields import in_space
 from fenics_contact.results.linear_state import as_linear
 from fenics_contact.results.multi_block import body_grid
+from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.revolved import check_turned
-from fenics_contact.results.state import State, comm_of
+from fenics_contact.results.state import State
 from fenics_contact.shapes.simple import SurfaceShape
 
 if TYPE_CHECKING:
@@ -231,7 +232,7 @@ def plot_stress(
 
 @naming_arguments
 def plot_field(
-    result: State | Bodies,
+    result: OnBodies | Bodies,
     field: str | Mapping[str, np.ndarray] = "von_mises",
     path: str | Path | None = None,
     *,
@@ -276,17 +277,17 @@ def plot_field(
     target, named = png_path(path), units or Units()
     checked_factor("scale", scale)
     given = checked_range(clim)
-    state = result if isinstance(result, State) else None
+    state = result if isinstance(result, OnBodies) else None
     if revolved:
-        check_turned(revolved, state is not None and state.scene.axisymmetric)
-    every: Bodies = drawn_bodies(result) if isinstance(result, State) else result
+        check_turned(revolved, state is not None and state.geometry.axisymmetric)
+    every: Bodies = drawn_bodies(result) if isinstance(result, OnBodies) else result
     known = [name for name in every if isinstance(field, str) or name in field]
     chosen = chosen_bodies(every, known if bodies is None else bodies)
     drawn = {name: linear(name, body) for name, body in chosen.items()}
     if isinstance(field, str):
         values, entry = _named_field(drawn, field, named)
     else:
-        meshes = state.scene.bodies if state else {}
+        meshes = state.geometry.bodies if state else {}
         cells = {k: meshes[k].mesh.cells_cut if state else cells_cut(k, body) for k, body in chosen.items()}
         values, entry = _own_field(drawn, cells, field, label)
     if revolved and ", " in entry["label"]:  # x, y, z in space are others than r, z and the way around
@@ -298,7 +299,7 @@ def plot_field(
     colours = SIGNED_MAP if entry["colours"] == "signed" else STRESS_MAP
     norm = Normalize(*(given or (ends if is_status else entry["range"])))
     head = headline(title, f"{facts}; displacement × {scale:g}")
-    axes = axes_of(state.scene) if state else ("x", "y")
+    axes = axes_of(state.geometry) if state else ("x", "y")
     coloured = ColouredField(values, colours, norm, words, head, float(scale), 0.0, named, width, axes)
     obstacles = obstacles_of(state) if state else []
     if revolved:
@@ -309,7 +310,7 @@ def plot_field(
         target,
         obstacles=obstacles,
         clip=clip,
-        comm=comm_of(state) if state else None,
+        comm=state.comm if state else None,
     )
 
 

@@ -46,7 +46,8 @@ def multi_block(
     blocks = pv.MultiBlock()
     for name, whole in meshes.items():
         fields = gather(name)
-        points = in_space(whole.points) + deformed * in_space(fields.points["displacement"])
+        moved = fields.points.get("displacement", np.zeros(whole.points.shape))
+        points = in_space(whole.points) + deformed * in_space(moved)
         mesh = whole.linear if linear else whole
         grid = body_grid(mesh, points, by_shapes=not linear)
         for key, values in fields.points.items():

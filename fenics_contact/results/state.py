@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -50,6 +50,7 @@ from fenics_contact.results.forces import (
     pair_resultants,
     support_reactions,
 )
+from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.preloads import Preloads
 from fenics_contact.results.resolution import PeakUncertainty, in_words
 from fenics_contact.results.rigid_motions import RigidMotion, UnheldMotion, rigid_motion
@@ -58,7 +59,6 @@ from fenics_contact.results.tools import ToolResult, tool_results
 
 if TYPE_CHECKING:
     import dolfinx
-    import pyvista
 
     from fenics_contact._accuracy.state_errors import BalancedTolerance, StateErrors
     from fenics_contact._fem.mechanics import Response
@@ -163,7 +163,7 @@ def comm_of(state: State, *_: Any, **__: Any) -> MPI.Comm:
 
 @displayed
 @dataclass(frozen=True, eq=False, kw_only=True)
-class State(ABC):
+class State(OnBodies):
     """Displacements, contact forces and how they were computed: a `LinearState` or a `DeformedState`.
 
     No attribute solves anything. Fields on the bodies' own meshes are built on first access, by all ranks
@@ -261,9 +261,14 @@ class State(ABC):
         return self.torn.scene
 
     @property
-    def time(self) -> float:
-        """The time at which obstacles that move are where they are: with small displacements zero."""
-        return 0.0
+    def geometry(self) -> Scene:
+        """The scene."""
+        return self.scene
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """The communicator over which its subdomains are spread."""
+        return comm_of(self)
 
     @cached_property
     def contact_places(self) -> np.ndarray:
@@ -421,6 +426,10 @@ class State(ABC):
             {"displacement": self.gather_displacement(body), **self._contact_fields(body), **on_nodes},
             {**on_cells, "von_mises": self.gather_von_mises(body), "subdomain": subdomain},
         )
+
+    def functions(self, body: str) -> list[dolfinx.fem.Function]:
+        """Return displacement and von Mises stress of a body, spread over the ranks. Collective."""
+        return [self.displacement[body], self.von_mises[body]]
 
     def _contact_fields(self, body: str) -> dict[str, np.ndarray]:
         return contact_fields(self.contact, self.scene, self.torn.decomposition.tearing, body)
@@ -583,47 +592,6 @@ class State(ABC):
     @cached_property
     def _nodal_forces(self) -> NodalForces:
         return nodal_forces(self.torn, self.solution.multiplier, self.torn_displacement)
-
-    @collectively("State.to_pyvista", comm_of)
-    def to_pyvista(
-        self, deformed: float = 0.0, *, linear: bool = False, revolved: float = 0.0
-    ) -> pyvista.MultiBlock:
-        """Return all bodies with their fields for pyvista, the same on every rank. Collective.
-
-        Args:
-            deformed: Scale factor of the displacement added to the points; 0 for the undeformed bodies.
-            linear: Cut quadratic cells into linear ones on the same nodes, as `pictures` do.
-            revolved: Angle in degrees by which the sections of bodies of revolution are turned around their
-                axis, then that of z, into linear cells of space with vectors and stresses there; 0 leaves
-                the sections.
-
-        Returns:
-            A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
-            the fields of `GatheredFields`, which `write_vtu` writes: on points ``displacement``, stresses
-            ``nodal_...`` and contact ``contact_...``, on cells ``von_mises``, ``stress``,
-            ``principal_stress`` and ``subdomain``. Plane bodies lie in the plane z = 0.
-
-        Raises:
-            InvalidInputError: If ``deformed`` is not finite, or other bodies are to be turned, or further
-                than 360 degrees.
-            MissingRequirementError: If pyvista is not installed.
-
-        Example:
-            >>> blocks = state.to_pyvista(deformed=10.0)  # doctest: +SKIP
-            >>> blocks["block"].plot(scalars="von_mises")  # doctest: +SKIP
-        """
-        from fenics_contact.results.multi_block import multi_block
-
-        meshes = {name: body.mesh for name, body in self.scene.deforming.items()}
-        if not revolved:
-            return multi_block(comm_of(self), meshes, self.gather_fields, deformed, linear=linear)
-        from fenics_contact.results.revolved import check_turned, turned_around
-
-        check_turned(revolved, self.scene.axisymmetric)
-        blocks = multi_block(comm_of(self), meshes, self.gather_fields, deformed, linear=True)
-        for name in meshes:
-            blocks[name] = turned_around(blocks[name], revolved)
-        return blocks
 
     @property
     def costs(self) -> Costs:
