@@ -242,7 +242,7 @@ class _Iteration:
         tied, passing = (torn.gathered(solution.multiplier, group) for group in torn.groups.joints)
         heat = np.zeros(self.joints.points.count)
         heat[conductance * self.joints.area > 0.0] = passing
-        balance = self._balance(torn, solution, field, heated, heat, friction)
+        balance = self._balance(torn, solution, field, heated, (heat, tied), friction)
         return HeatState(
             self.scene, torn, system, solution, self.joints, values,
             self._contacts(values, conductance, heat, friction.sum(axis=0)), tied, balance,
@@ -271,7 +271,7 @@ class _Iteration:
         solution: DualSolution,
         field: np.ndarray,
         heated: tuple[Heated, ...],
-        heat: np.ndarray,
+        passing: tuple[np.ndarray, np.ndarray],
         friction: np.ndarray,
     ) -> HeatBalance:
         """Return where heat comes from. Collective."""
@@ -281,29 +281,43 @@ class _Iteration:
             for number, exchange in each.exchanges.items():
                 entering[len(scene.held) + number] += exchange.heat(field[part])
             entering[-1] -= each.stored.heat(field[part])
-        self._add_held(entering, torn, solution)
+        first = self._first_held
+        self._add_held(entering, first, torn, solution)
         entering = comm.allreduce(entering)
+        # Rows of contacts and ties have no entries at nodes that are held.
+        joints, through = self.joints, np.zeros(len(first))
+        for points, own in ((joints.points, passing[0]), (joints.tied, passing[1])):
+            through += points.jump.T @ own
+        np.add.at(entering, first[first >= 0], through[first >= 0])
         parts: dict[str, float] = {}
-        for acting, own in zip((*scene.held, *scene.loads), entering, strict=False):
+        for acting, given in zip((*scene.held, *scene.loads), entering, strict=False):
             name = f"{type(acting).__name__} {acting.place}"
-            parts[name] = parts.get(name, 0.0) + float(own)
+            parts[name] = parts.get(name, 0.0) + float(given)
         for number, contact in enumerate(scene.contacts):
             mine = (self.joints.points.pair == number) & self.joints.on_obstacle
             if mine.any():
-                parts[f"ThermalContact {contact.place}"] = -float(heat[mine].sum())
+                parts[f"ThermalContact {contact.place}"] = -float(passing[0][mine].sum())
             if contact.friction.part > 0.0:
                 slave, master = friction[:, self.joints.points.pair == number].sum(axis=1)
                 entering_master = float(master) * contact.pair.between_bodies
                 parts[f"FrictionHeat {contact.place}"] = float(slave) + entering_master
         return HeatBalance(parts, float(entering[-1]))
 
-    def _add_held(self, entering: np.ndarray, torn: TornSystem, solution: DualSolution) -> None:
-        """Add the heat that enters this rank's rows of held temperatures, that of each node for its first."""
-        tearing, gluing = self.decomposition.tearing, self.decomposition.gluing
+    @property
+    def _first_held(self) -> np.ndarray:
+        """The first of the held temperatures at each node, −1 where there is none, (n_nodes,)."""
+        tearing = self.decomposition.tearing
         first = np.full(tearing.n_nodes, -1)
         for number, held in reversed([*enumerate(self.scene.held)]):
             mesh = self.scene.bodies[held.body].mesh
             first[tearing.global_nodes(held.body, mesh.nodes_to_hold(held.surface))] = number
+        return first
+
+    def _add_held(
+        self, entering: np.ndarray, first: np.ndarray, torn: TornSystem, solution: DualSolution
+    ) -> None:
+        """Add the heat that enters this rank's rows of held temperatures, that of each node for its first."""
+        gluing = self.decomposition.gluing
         owned = np.flatnonzero(torn.numbering.owned < torn.n_gluing)
         dof = gluing.dof[torn.numbering.owned[owned]]
         fixed = gluing.fixed.ravel()[dof]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import RigidPlane, Surface
+from fenics_contact import RigidPlane, Surface, Tie
 from fenics_contact.gallery import rectangle
 from fenics_contact.heat import (
     ConductingBody,
@@ -86,3 +86,17 @@ def test_heat_goes_from_the_given_slave_though_the_master_has_the_corner():
         assert np.sign(joint.slave - joint.master) == pytest.approx(np.sign(joint.heat))
         totals.append(joint.total)
     assert totals[0] < 0.0 < totals[1]
+
+
+@pytest.mark.parametrize("joint", ["contact", "tie"])
+def test_heat_is_balanced_where_a_held_node_touches(joint: str):
+    bodies = {
+        "upper": ConductingBody(rectangle((0.0, 1.0), (1.0, 2.0), (4, 4)), Conductor(2.0)),
+        "lower": ConductingBody(rectangle((0.0, 0.0), (1.0, 1.0), (3, 3)), Conductor(1.0)),
+    }
+    surfaces = Surface("upper", "y0"), Surface("lower", "y1")
+    joints = {"contact": {"contacts": [ThermalContact(*surfaces, 5.0)]}, "tie": {"ties": [Tie(*surfaces)]}}
+    held = [HeldTemperature("upper", "x0", 100.0), HeldTemperature("lower", "y0", 0.0)]
+    state = solve_heat(HeatScene(bodies, held, **joints[joint]), MPI.COMM_SELF)
+    assert state.balance.by_part["HeldTemperature lower y0"] < -10.0
+    assert state.balance.error < 1e-11
