@@ -36,10 +36,6 @@ class Touch:
         """Return that of some points, by indices."""
         return Touch(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
-    def part(self, chosen: np.ndarray) -> Touch:
-        """Return that of some of the points, by indices."""
-        return Touch(*(getattr(self, each.name)[chosen] for each in fields(self)))
-
 
 class Conductance(ABC):
     """A law of heat that passes between surfaces, q = h (T_slave − T_master), for one of your own.

@@ -13,7 +13,7 @@ from fenics_contact._scene.fields import not_negative
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.heat.conductance import Touch
 from fenics_contact.heat.parts import Value
-from fenics_contact.heat.properties import Conductor, TemperatureTable, at_temperatures
+from fenics_contact.heat.properties import Conductor, TemperatureTable
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class FrictionHeat:
         given: Any
         for name in ("coefficient", "speed"):
             given = getattr(self, name)
-            if not callable(given):
+            if isinstance(given, int | float):
                 remedy = "give how fast surfaces slide, and the friction as a positive number"
                 check_not_negative(f"FrictionHeat.{name}", given, remedy)
         for name in ("part", "share"):
@@ -81,7 +81,7 @@ class FrictionHeat:
         given = self.coefficient
         if isinstance(given, TemperatureTable):
             mean = 0.5 * (touch.slave + touch.master)
-            friction = at_temperatures("FrictionHeat.coefficient", given, mean)
+            friction = given.at(mean)
         else:
             friction = not_negative("FrictionHeat.coefficient", given, points)
         speed = not_negative("FrictionHeat.speed", self.speed, points)
@@ -112,12 +112,11 @@ def effusivity_share(slave: Conductor, master: Conductor, temperature: float = 2
     """
     found = []
     for each in (slave, master):
-        if each.heat_capacity is None:
+        if not each.capacities:
             raise InvalidInputError(
                 f"shares by effusivities need the heat capacities of both, got none for {each!r}: give "
                 "heat_capacity=..., or the share as a number"
             )
-        known: Any = each.heat_capacity
-        capacity = at_temperatures("Conductor.heat_capacity", known, np.array([temperature]))
-        found.append(np.sqrt(each.typical(temperature) * capacity[0]))
+        capacity = each.capacities[0].at(np.array(temperature))
+        found.append(np.sqrt(each.typical(temperature) * capacity))
     return float(found[0] / (found[0] + found[1]))

@@ -158,7 +158,9 @@ class _Iteration:
             products, last = state.products, state
             size = np.abs(state.values - self._level(state.values)).max()
             change = np.abs(state.values - guess).max()
-            if self.scene.is_linear or change <= settled * size:
+            # Even temperatures change by nothing but what linear systems leave.
+            least = self.problem.tolerance * np.abs(state.values).max()
+            if self.scene.is_linear or change <= max(settled * size, least):
                 return state
             guess = anderson.next(guess, state.values)
         raise ConvergenceError(

@@ -16,6 +16,7 @@ from fenics_contact.heat import (
     HeatState,
     HeldTemperature,
     PressureConductance,
+    Radiation,
     ThermalContact,
     harmonic_mean,
     solve_heat,
@@ -100,3 +101,10 @@ def test_heat_is_balanced_where_a_held_node_touches(joint: str):
     state = solve_heat(HeatScene(bodies, held, **joints[joint]), MPI.COMM_SELF)
     assert state.balance.by_part["HeldTemperature lower y0"] < -10.0
     assert state.balance.error < 1e-11
+
+
+def test_even_temperatures_settle_although_laws_depend_on_them():
+    body = ConductingBody(rectangle((0.0, 0.0), (1.0, 1.0), (2, 2)), Conductor(2.0))
+    around = Radiation("block", "y0", 0.5, 20.0, constant=1e-6)
+    state = solve_heat(HeatScene({"block": body}, loads=[around]), MPI.COMM_SELF)
+    assert state.values == pytest.approx(20.0)
