@@ -43,6 +43,8 @@ class HeatPart(ABC):
     body: str
     #: Whether its heat is no more than proportional to the temperature.
     is_linear = True
+    #: Whether it gives its body a temperature: holds one, or exchanges heat with surroundings that have one.
+    gives_temperature = False
     #: A temperature that it was given, not a number where it has none.
     level: Value = nan
 
@@ -103,6 +105,8 @@ class HeldTemperature(HeatPart):
     body: str
     surface: str
     value: Value
+
+    gives_temperature = True
 
     def __post_init__(self) -> None:
         """Reject what is no temperature."""
@@ -233,6 +237,7 @@ class Film(OnSurface):
     """What a surface exchanges with surroundings of a known temperature."""
 
     ambient: Value
+    gives_temperature = True
 
     @property
     def level(self) -> Value:  # type: ignore[override]
@@ -287,6 +292,11 @@ class Convection(Film):
         elif not callable(given):
             property_of("Convection.coefficient", given, "give a number, a function or a table")
         object.__setattr__(self, "ambient", _checked("Convection.ambient", self.ambient))
+
+    @property
+    def gives_temperature(self) -> bool:  # type: ignore[override]
+        """Whether there is a film."""
+        return self.coefficient != 0.0
 
     @property
     def is_linear(self) -> bool:  # type: ignore[override]

@@ -23,8 +23,10 @@ from fenics_contact.feti.row_groups import Glued
 from fenics_contact.feti.torn import TornSystem, at_rest, numbered
 from fenics_contact.heat.acceleration import Anderson
 from fenics_contact.heat.assembly import Assembly, Heated, Rate
+from fenics_contact.heat.determined import require_temperatures
 from fenics_contact.heat.forms import HeatForms, Part
 from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.plausible import odd_values, warn_of
 from fenics_contact.heat.rows import ConductingRows
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.heat.state import HeatBalance, HeatState, HeatThroughContact
@@ -187,6 +189,8 @@ class _Iteration:
         with together(decomposition.comm):
             conductance = self.joints.conductance(touch)
             friction = self.joints.friction(touch, self.given.work)
+            if not self.rate.factor:
+                require_temperatures(self.scene, self.joints, conductance)
         with timer.phase("assemble"), together(decomposition.comm):
             heated = tuple(self._heated(guess, friction))
         torn = self._torn(heated, self.joints.rows(conductance), last)
@@ -345,11 +349,12 @@ def solve_heat(
 
     Raises:
         InvalidInputError: If a law gives something that is no conductance, conductivity or capacity.
-        InfeasibleError: If nothing holds the temperature of a heated body.
+        InfeasibleError: If nothing gives a temperature to a body.
         ConvergenceError: If a solver, or the iteration of laws that depend on temperatures, does not settle.
 
     Example:
         >>> state = solve_heat(scene, MPI.COMM_WORLD)  # doctest: +SKIP
         >>> state.temperature["upper"].max()  # doctest: +SKIP
     """
+    warn_of(odd_values(scene), comm)
     return HeatProblem(scene, comm, partitions=partitions, tolerance=tolerance).solve()

@@ -1,0 +1,41 @@
+"""Whether steady temperatures are determined: each body needs a given one, or a way for heat to one."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from fenics_contact._scene.pairs import Surface
+from fenics_contact.errors import InfeasibleError
+from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.scene import HeatScene
+
+
+def require_temperatures(scene: HeatScene, joints: Joints, conductance: np.ndarray) -> None:
+    """Raise `InfeasibleError` where nothing gives a temperature to bodies that heat joins.
+
+    `conductance`: h at the points of contacts, (n,), [power / (length² · degree)].
+    """
+    through = [scene.contacts[number] for number in np.unique(joints.points.pair[conductance > 0.0])]
+    between = [each for each in through if isinstance(each.master, Surface)]
+    tied = [scene.ties[number] for number in np.unique(joints.tied.pair)]
+    given = {part.body for part in (*scene.held, *scene.loads) if part.gives_temperature}
+    given |= {each.slave.body for each in through if each not in between}
+    names = list(scene.bodies)
+    joined = [[names.index(side.body) for side in (each.slave, each.master)] for each in (*between, *tied)]
+    ends = np.array(joined, dtype=int).reshape(-1, 2).T
+    _, island = connected_components(sp.coo_matrix((np.ones(ends.shape[1]), ends), (len(names),) * 2))
+    lost = [name for name, own in zip(names, island, strict=True) if own not in
+            {island[names.index(known)] for known in given}]  # fmt: skip
+    if lost:
+        heating = [f"{type(each).__name__} {each.place}" for each in scene.loads if each.body in lost]
+        blocked = [each.place for each in scene.contacts if each not in through]
+        raise InfeasibleError(
+            f"a steady state needs a temperature that is given to each body, {' and '.join(map(repr, lost))} "
+            + (f"have none and heat of {' and '.join(heating)} has no way out" if heating else
+               "have none and no heat: any temperature would do")
+            + ": hold a temperature there, add Convection, Radiation or an obstacle, or join what has one"
+            + (f"; no heat passes through {' and '.join(blocked)}, by conductance, pressure and gap"
+               if blocked else "")
+        )  # fmt: skip

@@ -1,0 +1,134 @@
+"""What steady heat cannot be computed from, and constants that are hardly meant, in words."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import Body, RigidPlane, Scene, Surface, Tie
+from fenics_contact.errors import InfeasibleError
+from fenics_contact.gallery import rectangle
+from fenics_contact.heat import (
+    ConductingBody,
+    Conductor,
+    Convection,
+    GapConductance,
+    HeatFlux,
+    HeatScene,
+    HeldTemperature,
+    PressureConductance,
+    Radiation,
+    ThermalContact,
+    solve_heat,
+)
+from fenics_contact.heat.plausible import odd_power, odd_values
+from fenics_contact.materials import PlaneStrain
+
+
+def bars(count: int = 3, conductivity: float = 2.0, size: float = 1.0, **parts: Any) -> HeatScene:
+    """Return bars a, b, c in a row."""
+    bodies = {
+        name: ConductingBody(
+            rectangle((k * size, 0.0), ((k + 1) * size, size), (2, 2)), Conductor(conductivity)
+        )
+        for k, name in enumerate("abc"[:count])
+    }
+    return HeatScene(bodies, **parts)
+
+
+def joint(slave: str, master: str, law: Any = 5.0, **own: Any) -> ThermalContact:
+    return ThermalContact(Surface(slave, "x1"), Surface(master, "x0"), law, **own)
+
+
+HELD = HeldTemperature("a", "x0", 20.0)
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        (
+            {"held": [HELD], "loads": [HeatFlux("c", "x1", 3.0)], "contacts": [joint("b", "c")]},
+            "needs a temperature that is given to each body, 'b' and 'c' have none and heat of HeatFlux c x1 "
+            "has no way out: hold a temperature there, add Convection",
+        ),
+        ({"held": [HELD], "contacts": [joint("b", "c")]}, "'b' and 'c' have none and no heat: any temper"),
+        ({"held": [HELD], "ties": [Tie(Surface("b", "x0"), Surface("a", "x1"))]}, "each body, 'c' have none"),
+        ({}, "'a' and 'b' and 'c' have none and no heat"),
+        (
+            {
+                "held": [HELD],
+                "contacts": [joint("a", "b"), joint("b", "c", PressureConductance(1.0, 100.0))],
+            },
+            "'c' have none .*; no heat passes through b x1 - c x0, by conductance, pressure and gap",
+        ),
+        (
+            {"loads": [Convection("a", "y0", 0.0, 20.0)], "contacts": [joint("a", "b"), joint("b", "c")]},
+            "'a' and 'b' and 'c' have none and heat of Convection a y0 has no way out",
+        ),
+    ],
+)
+def test_bodies_without_a_temperature_are_named(parts: dict[str, Any], message: str) -> None:
+    with pytest.raises(InfeasibleError, match=message):
+        solve_heat(bars(**parts), MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"held": [HELD]},
+        {"loads": [Convection("a", "y0", 1e-3, 20.0)]},
+        {"loads": [Radiation("a", "y0", 0.5, 20.0, constant=1e-6)]},
+        {"obstacle": True},
+    ],
+)
+def test_a_way_to_one_temperature_is_enough(parts: dict[str, Any]) -> None:
+    plane = ThermalContact(Surface("a", "y0"), RigidPlane((0, 0), (0, 1)), 3.0, temperature=20.0)
+    given = {name: value for name, value in parts.items() if name != "obstacle"}
+    contacts = [joint("b", "c", GapConductance(0.1, 0.1)), *([plane] if "obstacle" in parts else [])]
+    tie = Tie(Surface("b", "x0"), Surface("a", "x1"))
+    state = solve_heat(bars(contacts=contacts, ties=[tie], **given), MPI.COMM_SELF)
+    assert state.values == pytest.approx(20.0)
+
+
+def test_the_conductivity_of_a_metal_in_metres_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    held = [HELD, HeldTemperature("a", "x1", 30.0)]
+    for conductivity, size, warned in ((45.0, 60.0, 1), (45.0, 1.0, 0), (0.045, 60.0, 0), (2.0, 60.0, 0)):
+        caplog.clear()
+        with caplog.at_level(logging.WARNING, logger="fenics_contact"):
+            solve_heat(bars(1, conductivity, size, held=held), MPI.COMM_SELF)
+        assert len(caplog.messages) == warned
+    with caplog.at_level(logging.WARNING, logger="fenics_contact"):
+        solve_heat(bars(1, 45.0, 60.0, held=held), MPI.COMM_SELF)
+    (words,) = caplog.messages
+    assert "odd units in body 'a'? a conductivity of 45 is that of a metal in W/(m K)" in words
+    assert "in W and mm it would be 0.045" in words
+
+
+def test_capacities_in_n_and_mm_show_that_conductivities_are_too(caplog: pytest.LogCaptureFixture) -> None:
+    mesh = rectangle((0.0, 0.0), (60.0, 1.0), (2, 2))
+    held = [HELD]
+    with caplog.at_level(logging.WARNING, logger="fenics_contact"):
+        solve_heat(HeatScene({"a": ConductingBody(mesh, Conductor(45.0, 3.6))}, held), MPI.COMM_SELF)
+        assert not caplog.messages
+        solve_heat(HeatScene({"a": ConductingBody(mesh, Conductor(45.0, 3.6e6))}, held), MPI.COMM_SELF)
+    assert len(caplog.messages) == 1
+
+
+def test_the_constant_of_radiation_in_metres_is_warned_of() -> None:
+    warm = [Radiation("a", "x1", 0.8, 300.0, constant=each) for each in (5.670374419e-8, 5.670374419e-14)]
+    (words,) = odd_values(bars(1, 0.1, 60.0, loads=warm))
+    assert "Radiation a x1? its constant is in W/(m² K⁴), the body is 60 long: in W and mm give" in words
+    assert not list(odd_values(bars(1, 0.1, 1.0, loads=warm)))
+
+
+def test_power_in_watts_does_not_go_with_moduli_in_newtons_and_millimetres() -> None:
+    heat = bars(2, 0.045)
+    steel, soft = PlaneStrain(2.1e5, 0.3), PlaneStrain(5.0, 0.3)
+    scene = Scene({"a": Body(heat.bodies["a"].mesh, steel), "b": Body(heat.bodies["b"].mesh, soft)})
+    (words,) = odd_power(scene, heat)
+    assert "body 'a'? a conductivity of 0.045 is that of a metal in W/(mm K)" in words
+    assert words.endswith("power is then in N mm/s and the conductivity 45")
+    assert not list(odd_power(scene, bars(2, 45.0)))
