@@ -293,16 +293,26 @@ def _leading_statics(cards: Sequence[Card]) -> tuple[Sequence[Card], Sequence[Ca
 
 def _built(built: DeckBodies) -> Deck:
     """Return the deck: the scene before the first step, and the steps."""
-    deck, mesh = built.deck, built.deck.mesh
     supports, pairs = SupportBuilder(built), pairs_of(built)
     scene = _scene(built, supports, pairs)
-    steps, step_of = _load_steps(built, supports, pairs, scene)
+    return deck_with(built, scene, *_load_steps(built, supports, pairs, scene), built.steps.prints)
+
+
+def deck_with(
+    built: DeckBodies,
+    scene: Scene,
+    steps: Sequence[LoadStep],
+    step_of: Sequence[int],
+    prints: Sequence[tuple[int, Card]],
+) -> Deck:
+    """Return a deck of a scene and its steps, with the numbers of the mesh."""
+    deck, mesh = built.deck, built.deck.mesh
     return Deck(
         name=deck.name,
         scene=scene,
         steps=steps,
         step_of=step_of,
-        prints=tuple(_print(step, card) for step, card in built.steps.prints),
+        prints=tuple(_print(step, card) for step, card in prints),
         notes=tuple(deck.record.notes),
         thickness=deck.thickness,
         node_numbers={n: np.where(at < 0, 0, mesh.numbers[at]) for n, at in built.parts.nodes.items()},

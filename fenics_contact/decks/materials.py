@@ -60,7 +60,7 @@ def read_materials(cards: Sequence[Card]) -> tuple[dict[str, MaterialCards], dic
 Axes: TypeAlias = tuple[tuple[float, float, float], ...]
 
 
-def _axes(card: Card | None) -> Axes:
+def axes_of(card: Card | None) -> Axes:
     """Return the axes of a rectangular orientation as rows."""
     if card is None:
         return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -96,14 +96,14 @@ def row_at(card: Card, width: int, temperature: float, what: str) -> list[float]
 
     Linear between rows, constant beyond them.
     """
-    table = _table(card, width)
+    table = table_of(card, width)
     if not len(table):
         raise card.error(f"needs {what}, it has no data line: add it")
     table = table[np.argsort(table[:, -1], kind="stable")]
     return [float(np.interp(temperature, table[:, -1], table[:, k])) for k in range(width)]
 
 
-def _table(card: Card, width: int) -> np.ndarray:
+def table_of(card: Card, width: int) -> np.ndarray:
     """Return the rows of a table, (n, width + 1), each over as many lines of eight numbers as it needs."""
     lines = [card.floats(k) for k in range(len(card.lines))]
     per = -(-(width + 1) // 8)
@@ -113,7 +113,7 @@ def _table(card: Card, width: int) -> np.ndarray:
 
 def depends_on_temperature(card: Card, width: int) -> bool:
     """Return whether a table has rows for several temperatures that differ."""
-    table = _table(card, width)
+    table = table_of(card, width)
     return bool(len(table) > 1 and np.ptp(table[:, :width], axis=0).any())
 
 
@@ -220,7 +220,7 @@ def _by_temperature(parts: Mapping[str, Card], of: Conditions) -> Material:
 
 def _curve_of(card: Card, width: int, column: int) -> ByTemperature:
     """Return a column of a table with a temperature behind each row, a number if it is the same in all."""
-    table = _table(card, width)
+    table = table_of(card, width)
     if not np.ptp(table[:, column]):
         return float(table[0, column])
     table = table[np.argsort(table[:, -1], kind="stable")]
@@ -300,7 +300,7 @@ def _orthotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
     else:
         raise card.error(f"TYPE={kind} is not read: give ISO, ORTHO, ENGINEERING CONSTANTS or ANISO")
     alpha = _expansion(parts, of, 3)
-    rows = _axes(axes)
+    rows = axes_of(axes)
     if of.kind == "plane stress":
         if abs(rows[2][2]) < 1.0 - 1e-9:
             raise card.error("axes of a plane material must lie in the plane: correct *ORIENTATION")
@@ -340,7 +340,7 @@ def _anisotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
     moduli = np.zeros((6, 6))
     column, row = np.tril_indices(6)  # the upper triangle column by column
     moduli[_IN_VOIGT[row], _IN_VOIGT[column]] = moduli[_IN_VOIGT[column], _IN_VOIGT[row]] = values
-    return AnisotropicElasticity(moduli, _axes(axes), _expansion(parts, of, 6) or None)  # type: ignore[arg-type]
+    return AnisotropicElasticity(moduli, axes_of(axes), _expansion(parts, of, 6) or None)  # type: ignore[arg-type]
 
 
 def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fenics_contact.decks.initial_stress import kind_of
 from fenics_contact.decks.multi_point import NO_ROWS, Equation, Rows
-from fenics_contact.decks.vocabulary import PRINT_CARDS, PROCEDURES
+from fenics_contact.decks.vocabulary import HEAT, PRINT_CARDS, PROCEDURES
 from fenics_contact.readers.deck_cards import AtLine, Card, DeckError, plain
 from fenics_contact.readers.deck_mesh import DeckMesh
 
@@ -365,7 +365,7 @@ def read_steps(cards: Sequence[Card], mesh: DeckMesh) -> DeckSteps:
     amplitudes, initial = Amplitudes.of(cards), _initial(cards, mesh)
     state, reached = StepState.free(initial), Instant.rest(initial)
     steps, targets, prints = list[Step](), list[Held](), list[tuple[int, Card]]()
-    for group in _groups(cards):
+    for group in groups_of(cards):
         held = [each for each in group if each.name == "BOUNDARY"]
         if group[0].name == "STEP":
             _check_step(group[0], group)
@@ -382,7 +382,7 @@ def read_steps(cards: Sequence[Card], mesh: DeckMesh) -> DeckSteps:
     return DeckSteps(steps, targets, prints, initial, rest)
 
 
-def _groups(cards: Sequence[Card]) -> Iterator[list[Card]]:
+def groups_of(cards: Sequence[Card]) -> Iterator[list[Card]]:
     """Yield the cards of each step, and each card outside of steps that holds nodes."""
     inside = list[Card]()
     for card in cards:
@@ -450,7 +450,8 @@ def _check_step(head: Card, group: Sequence[Card]) -> None:
         raise head.error(f"AMPLITUDE={amplitude} is not read: RAMP and STEP are")
     for card in group:
         if card.name in PROCEDURES:
-            raise card.error("only *STATIC is solved: leave this step out, or read with statics_only")
+            other = "; decks of heat alone are read by read_heat_deck" * (card.name in HEAT)
+            raise card.error(f"only *STATIC is solved: leave this step out, or read with statics_only{other}")
     if not any(card.name == "STATIC" for card in group):
         raise head.error("needs *STATIC: nothing else is solved here, add it")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 
 from fenics_contact.readers.deck_cards import Card, DeckError
 from fenics_contact.readers.deck_elements import element_of
@@ -88,6 +88,19 @@ PROCEDURES = {
     "STEADYSTATEDYNAMICS", "VISCO", "CFD", "GREEN", "SENSITIVITY", "ELECTROMAGNETICS", "COMPLEXFREQUENCY",
     "UNCOUPLEDTEMPERATURE-DISPLACEMENT", "SUBSTRUCTUREGENERATE", "CRACKPROPAGATION", "FEASIBLEDIRECTION",
 }  # fmt: skip
+#: Procedures of steps that conduct heat.
+HEAT = {"HEATTRANSFER"}
+#: Cards of the model that say how heat is conducted; others have no effect on it.
+HEAT_MODEL = MESH_CARDS | {
+    "SOLIDSECTION", "MATERIAL", "ORIENTATION", "DISTRIBUTION", "INITIALCONDITIONS", "CONTACTPAIR",
+    "SURFACEINTERACTION", "SURFACEBEHAVIOR", "TIE", "CYCLICSYMMETRYMODEL", "CONDUCTIVITY", "SPECIFICHEAT",
+    "DENSITY",
+}  # fmt: skip
+#: Cards of steps that conduct heat, and of what they have.
+HEAT_CARDS = HEAT | {
+    "HEADING", "STEP", "ENDSTEP", "BOUNDARY", "AMPLITUDE", "DFLUX", "FILM", "RADIATE", "CFLUX",
+    "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
+}  # fmt: skip
 #: Parameters of the cards that are read; any other one is refused.
 PARAMETERS: dict[str, set[str]] = {
     "NODE": {"NSET", "SYSTEM"},
@@ -139,6 +152,12 @@ PARAMETERS: dict[str, set[str]] = {
     "DLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
     "DSLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "CONSTANTRESULTANT", "FOLLOWER"},
     "TEMPERATURE": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "LINTEMP"},
+    "HEATTRANSFER": {"STEADYSTATE", "DIRECT", "SOLVER", "DELTMX", "TIMERESET", "END", "MXDEM"},
+    "CONDUCTIVITY": {"TYPE"},
+    "SPECIFICHEAT": set(),
+    "GAPCONDUCTANCE": {"PRESSURE"},
+    "PHYSICALCONSTANTS": {"ABSOLUTEZERO", "STEFANBOLTZMANN"},
+    **{name: {"OP", "AMPLITUDE", "TIMEDELAY"} for name in ("CFLUX", "DFLUX", "FILM", "RADIATE")},
 }
 #: Cards that change what is solved, by what they are of.
 STRUCTURES = {
@@ -152,16 +171,16 @@ STRUCTURES = {
     "DEPVAR": "it belongs to materials of user routines, which are not read",
     "SUBMODEL": "submodels are not read: give displacements by *BOUNDARY",
     "CREEP": "creep is not solved here: it goes on in time",
-    "FILM": "heat is not conducted here: give temperatures by *TEMPERATURE",
-    "RADIATE": "heat is not conducted here: give temperatures by *TEMPERATURE",
-    "DFLUX": "heat is not conducted here: give temperatures by *TEMPERATURE",
-    "CFLUX": "heat is not conducted here: give temperatures by *TEMPERATURE",
+    **{
+        name: "heat is conducted in decks with *HEAT TRANSFER: give temperatures by *TEMPERATURE"
+        for name in ("FILM", "RADIATE", "DFLUX", "CFLUX", "GAPCONDUCTANCE")
+    },
 }
 
 
-def refuse_unknown(cards: Sequence[Card]) -> None:
+def refuse_unknown(cards: Sequence[Card], known: Set[str] = KNOWN | PROCEDURES) -> None:
     """Refuse unknown cards, types of elements and parameters, all in one error, each with its line."""
-    found = list(_unknown(cards))
+    found = list(_unknown(cards, known))
     if not found:
         return
     (card, words), *others = found
@@ -171,19 +190,19 @@ def refuse_unknown(cards: Sequence[Card]) -> None:
     raise card.error(words)
 
 
-def _unknown(cards: Sequence[Card]) -> Iterator[tuple[Card, str]]:
+def _unknown(cards: Sequence[Card], known: Set[str]) -> Iterator[tuple[Card, str]]:
     """Yield each card, type of elements and parameter that is not known, once."""
     seen = set[str]()
     for card in cards:
-        for words in _of_card(card):
+        for words in _of_card(card, known):
             key = f"{card.name} {words}"
             if key not in seen:
                 seen.add(key)
                 yield card, words
 
 
-def _of_card(card: Card) -> Iterator[str]:
-    if card.name not in KNOWN and card.name not in PROCEDURES:
+def _of_card(card: Card, known: Set[str]) -> Iterator[str]:
+    if card.name not in known:
         unknown = "this card is not known: the guide lists those that are; leave it out if it has no effect"
         yield STRUCTURES.get(card.name, unknown)
         return

@@ -1,0 +1,268 @@
+"""Decks whose steps conduct heat, as scenes of heat."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact._base.checks import naming_arguments, require_file
+from fenics_contact._base.display import displayed
+from fenics_contact._scene.fields import NodeValues
+from fenics_contact._scene.pairs import Surface, Tie
+from fenics_contact.decks.bodies import DeckBodies
+from fenics_contact.decks.cards import DeckCards, Record
+from fenics_contact.decks.deck import Deck, deck_with
+from fenics_contact.decks.heat_materials import conductance_of, conductor_of, read_conductances
+from fenics_contact.decks.heat_steps import AtNodes, HeatCards, heat_steps
+from fenics_contact.decks.names import names_of
+from fenics_contact.decks.pairs import pairs_of
+from fenics_contact.decks.steps import groups_of, read_steps
+from fenics_contact.decks.vocabulary import HEAT_CARDS, HEAT_MODEL, KNOWN, PRINT_CARDS, refuse_unknown
+from fenics_contact.errors.ranks import on_root_then_bcast
+from fenics_contact.heat.parts import HeatAtNodes, HeldTemperature
+from fenics_contact.heat.problem import solve_heat
+from fenics_contact.heat.properties import Conductor
+from fenics_contact.heat.scene import ConductingBody, HeatScene, ThermalContact
+from fenics_contact.heat.state import HeatState
+from fenics_contact.readers.deck_assembly import read_cards
+from fenics_contact.readers.deck_bodies import Component, build_bodies, regions_of, split_sections
+from fenics_contact.readers.deck_cards import Card, DeckError
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """What makes a part of a scene: where, and of which values, the first of which follow an amplitude."""
+
+    make: Callable[..., Any]
+    body: str
+    name: str
+    values: tuple[Any, ...]
+    by: int
+
+    def at(self, factors: np.ndarray) -> Any:
+        """Return the part with factors of amplitudes by their numbers."""
+        first, *rest = self.values
+        factor = float(factors[self.by])
+        first = NodeValues(first.points, factor * first.values) if callable(first) else factor * first
+        return self.make(self.body, self.name, first, *rest)
+
+
+@dataclass(frozen=True, eq=False)
+class HeatStep:
+    """A step of heat; `held` and `loads`: what makes the parts of its scenes."""
+
+    cards: HeatCards
+    held: Sequence[Placed]
+    loads: Sequence[Placed]
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class HeatDeck:
+    """A deck of CalculiX or Abaqus whose steps conduct heat.
+
+    Attributes:
+        frame: Its mesh, numbers, sets, prints and notes.
+        bodies: Its bodies by name.
+        contacts: Its contact pairs with a conductance.
+        ties: Its ties, whose temperatures are equal.
+        initial: Initial temperatures of the nodes of each body.
+        steps: Its steps.
+    """
+
+    frame: Deck
+    bodies: Mapping[str, ConductingBody]
+    contacts: Sequence[ThermalContact]
+    ties: Sequence[Tie]
+    initial: Mapping[str, np.ndarray]
+    steps: Sequence[HeatStep]
+
+    def scene(self, step: int = 0, time: float | None = None) -> HeatScene:
+        """Return the scene of a step, numbered from 0, at a time since it began, by default at its end."""
+        of = self.steps[step]
+        factors = of.cards.factors(of.cards.period if time is None else time)
+        held, loads = ([each.at(factors) for each in parts] for parts in (of.held, of.loads))
+        return HeatScene(self.bodies, held, loads, self.contacts, self.ties)
+
+    def solve(self, comm: MPI.Comm, **settings: Any) -> list[HeatState]:
+        """Compute the state at the end of each step. Collective; settings are those of `solve_heat`."""
+        return [solve_heat(self.scene(k), comm, **settings) for k in range(len(self.steps))]
+
+
+@naming_arguments
+def read_heat_deck(path: str | Path, comm: MPI.Comm | None = None) -> HeatDeck:
+    """Read a deck whose steps are all *HEAT TRANSFER.
+
+    Elements of heat (DC3D8, ...) and of mechanics (C3D8, ...) conduct alike, integrated in full. What holds
+    and loads bodies mechanically is left out, which the notes say.
+
+    Args:
+        path: The file, mostly ``.inp``.
+        comm: If given, rank 0 reads the file and all ranks receive the deck.
+
+    Raises:
+        DeckError: With card and line, if a card, an element, a set or a parameter is not known or does not
+            fit.
+
+    Note:
+        Collective on ``comm`` if given.
+
+    Example:
+        >>> states = read_heat_deck("fin.inp").solve(MPI.COMM_WORLD)  # doctest: +SKIP
+    """
+    return on_root_then_bcast(comm, lambda: _read(Path(path)))
+
+
+def conducts(path: Path) -> bool:
+    """Return whether a step of a deck conducts heat."""
+    return path.is_file() and any(card.name == "HEATTRANSFER" for card in read_cards(path))
+
+
+def _read(path: Path) -> HeatDeck:
+    require_file(path, "a deck")
+    cards = [_solid(card) for card in read_cards(path)]
+    refuse_unknown(cards, KNOWN | HEAT_CARDS)
+    start = next((k for k, card in enumerate(cards) if card.name == "STEP"), len(cards))
+    frame = [card for card in cards[:start] if card.name in HEAT_MODEL]
+    deck = DeckCards.of(path.name, frame, Record())
+    for card in cards:
+        if card.name not in HEAT_MODEL | HEAT_CARDS | PRINT_CARDS:
+            deck.note(card, "has no effect on heat")
+        if card.name == "EQUATION" and any(len(row) > 1 and row[1] == "11" for row in card.rows):
+            raise card.error("equations of temperatures are not solved: join bodies by *TIE")
+    steps = heat_steps(cards, deck.mesh)
+    heated = [each.faces for step in steps for each in step.acting if not each.on_faces]
+    sets = [(f"DFLUX {k}", faces.elements) for k, faces in enumerate(heated, start=1)]
+    mesh, sections, of_element, parts = split_sections(
+        deck.mesh, deck.sections, deck.of_element, deck.components, sets
+    )
+    deck = replace(deck, mesh=mesh, sections=sections, of_element=of_element, components=parts)
+    return _Builder(deck, cards, steps).made()
+
+
+def _solid(card: Card) -> Card:
+    """Return a card with elements of heat as solid ones; reduced ones are integrated in full."""
+    if card.name != "ELEMENT":
+        return card
+    match = re.fullmatch(r"D?(C3D|C2D|CPS|CPE|CAX)(\d+)(R?)[A-Z]*", card.name_of("TYPE"))
+    if match is None:
+        raise card.error(
+            f"elements of type {card.name_of('TYPE')} do not conduct heat here: give solid ones (DC3D, C3D), "
+            "plane ones (DC2D, CPS, CPE) or axisymmetric ones (DCAX, CAX)"
+        )
+    kind = match[1].replace("C2D", "CPE") + match[2] + match[3]
+    return replace(card, parameters={**card.parameters, "TYPE": kind})
+
+
+class _Builder:
+    """Names what is held and heated, and makes the bodies with these names."""
+
+    def __init__(self, deck: DeckCards, cards: Sequence[Card], steps: Sequence[HeatCards]) -> None:
+        self.deck, self.cards, self.steps = deck, cards, steps
+        names, self.known = names_of(deck, read_steps(deck.cards, deck.mesh)), dict[bytes, str]()
+        surfaces, node_sets = dict(names.surfaces), dict(names.node_sets)
+        for step in steps:
+            for nodes, _, _ in (*step.held.groups(), *step.flux.groups()):
+                node_sets[self._name("NODES", nodes)] = nodes
+            for each in step.acting:
+                if each.on_faces:
+                    deck.exterior.require(each.faces, each.card, each.row, "heat must enter", "correct it")
+                    surfaces[self._name("FACES", *vars(each.faces).values())] = each.faces
+        self.parts = build_bodies(
+            deck.mesh, deck.components, deck.of_element, deck.sections, surfaces, node_sets,
+            f"deck '{deck.name}'",
+        )  # fmt: skip
+        self.built = DeckBodies(deck, read_steps(deck.cards, deck.mesh), names, self.parts, {})
+
+    def _name(self, kind: str, *place: np.ndarray) -> str:
+        """Return the name of nodes or faces, always the same one."""
+        key = b"".join([kind.encode(), *(each.tobytes() for each in place)])
+        return self.known.setdefault(key, f"{kind} {len(self.known) + 1}")
+
+    def made(self) -> HeatDeck:
+        """Return the deck."""
+        deck, meshes = self.deck, self.parts.meshes
+        for first, second, _ in self.parts.joints():
+            words = f"bodies {first} and {second} share nodes, but no faces: heat passes by *TIE"
+            raise DeckError(words, deck.name)
+        bodies = {part.name: self._body(part) for part in deck.components}
+        contacts, ties = self._contacts()
+        steps = [
+            HeatStep(
+                step,
+                [*self._at_nodes(step.held, HeldTemperature)],
+                [*self._at_nodes(step.flux, HeatAtNodes), *self._acting(step)],
+            )
+            for step in self.steps
+        ]
+        every = self.built.steps.initial
+        initial = {name: every[self.parts.nodes[name][: mesh.n_nodes]] for name, mesh in meshes.items()}
+        scene = HeatScene(bodies, contacts=contacts, ties=ties).geometry
+        inside = [group for group in groups_of(self.cards) if group[0].name == "STEP"]
+        prints = [(k, card) for k, own in enumerate(inside) for card in own if card.name in PRINT_CARDS]
+        frame = deck_with(self.built, scene, (), range(len(steps)), prints)
+        return HeatDeck(frame, bodies, contacts, ties, initial, steps)
+
+    def _contacts(self) -> tuple[list[ThermalContact], list[Tie]]:
+        """Return contact pairs with a conductance, and ties."""
+        deck, pairs, laws = self.deck, pairs_of(self.built), read_conductances(self.cards)
+        size, contacts, ties = float(np.ptp(deck.mesh.points, axis=0).max()), [], []
+        for of, pair in pairs.contacts:
+            law = laws.get(of.card.name_of("INTERACTION"))
+            if law is None:
+                deck.note(of.card, "passes no heat: its interaction has no *GAP CONDUCTANCE")
+            elif isinstance(pair.master, Surface):
+                made = conductance_of(law, max(pair.adjust or 0.0, 1e-4 * size))
+                contacts.append(ThermalContact(pair.slave, pair.master, made))
+        for of, tie in pairs.ties:
+            if not isinstance(tie, Tie):
+                raise of.error("sectors around an axis do not conduct heat here: mesh all of it")
+            ties.append(tie)
+        return contacts, ties
+
+    def _body(self, part: Component) -> ConductingBody:
+        deck, given = self.deck, dict[str, Conductor]()
+        sections = regions_of(deck.sections, part)
+        for region, each in sections.items():
+            cards = each.card.known("material", each.material, deck.materials)
+            given[region] = conductor_of(cards, deck.orientations.get(each.orientation), deck.dim)
+        flat = deck.kind in ("plane stress", "plane strain")
+        thick = {each.thickness for each in sections.values()} if flat else {1.0}
+        if len(thick) > 1:
+            raise deck.sections[0].card.error("one plane body must have one thickness: cut it, and tie parts")
+        material: Any = given if len(given) > 1 else next(iter(given.values()))
+        return ConductingBody(self.parts.meshes[part.name], material, deck.kind == "axisymmetric", *thick)
+
+    def _at_nodes(self, given: AtNodes, make: Callable[..., Any]) -> Iterator[Placed]:
+        """Yield what is given to nodes, body by body."""
+        for nodes, values, by in given.groups():
+            for body, mesh in self.parts.meshes.items():
+                mine, places = self.parts.within(body, nodes)
+                own = values[np.isin(nodes, mine)]
+                if len(own):
+                    value = NodeValues(mesh.points[places], own) if np.ptp(own) else float(own[0])
+                    yield Placed(make, body, self._name("NODES", nodes), (value,), by)
+
+    def _acting(self, step: HeatCards) -> Iterator[Placed]:
+        """Yield what is given to faces and volumes, body by body."""
+        deck = self.deck
+        for each in step.acting:
+            if each.on_faces:
+                name = self._name("FACES", *vars(each.faces).values())
+                places = [(body, name) for body, mesh in self.parts.meshes.items() if name in mesh.surfaces]
+            else:
+                places = [
+                    (part.name, region if len(part.sections) > 1 else "")
+                    for part in deck.components
+                    for region, number in zip(regions_of(deck.sections, part), part.sections, strict=True)
+                    if np.isin(np.flatnonzero(deck.of_element == number), each.faces.elements).all()
+                ]
+            yield from (Placed(each.make, *place, each.values, each.by) for place in places)

@@ -1,0 +1,224 @@
+"""Decks that conduct heat: closed forms, numbers of CalculiX 2.20, and what is refused by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.decks import DeckError, HeatDeck, read_deck, read_heat_deck
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.heat import HeatState
+from fenics_contact.mesh import quadratic
+from tests.decks.texts import deck, mesh_cards
+
+COPPER = "*MATERIAL, NAME=COPPER\n*CONDUCTIVITY\n0.4\n*DENSITY\n9.E-6\n*SPECIFIC HEAT\n400.\n"
+SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=COPPER\n"
+#: 4 long, 1 wide and high; face 6 of the first element is at x = 0, face 4 of the last one at x = 4.
+MESH = mesh_cards({"BAR": block((0, 0, 0), (4, 1, 1), (4, 1, 1))})
+BAR = MESH + COPPER + SECTION
+CONSTANTS = "*PHYSICAL CONSTANTS, ABSOLUTE ZERO=-273.15, STEFAN BOLTZMANN=5.67E-11\n"
+COLD = "*BOUNDARY\nBAR_X0, 11, 11, 20.\n"
+
+
+def steady(cards: str) -> str:
+    return f"*STEP\n*HEAT TRANSFER, STEADY STATE\n{cards}*END STEP\n"
+
+
+def solved(folder: Path, text: str) -> tuple[HeatDeck, list[HeatState]]:
+    found = read_heat_deck(deck(folder, text), MPI.COMM_SELF)
+    return found, found.solve(MPI.COMM_SELF)
+
+
+def temperatures(found: HeatDeck, state: HeatState) -> dict[int, float]:
+    """Temperatures by the numbers of the nodes in the deck."""
+    known = {}
+    for body, numbers in found.frame.node_numbers.items():
+        known |= dict(zip(numbers.tolist(), state.temperature[body], strict=True))
+    return known
+
+
+def at_end(folder: Path, load: str, model: str = BAR) -> float:
+    """The temperature at x = 4 of a bar that is held at 20 at x = 0."""
+    found, (state,) = solved(folder, model + steady(COLD + load))
+    (body,) = found.bodies.values()
+    end = body.mesh.points[:, 0] > 4.0 - 1e-9
+    values = state.temperature["BAR"][end]
+    assert np.ptp(values) < 1e-9
+    assert state.balance.error < 1e-11
+    return float(values.mean())
+
+
+@pytest.mark.parametrize(
+    ("load", "expected"),
+    [
+        ("*DFLUX\n4, S4, 0.2\n", 20.0 + 0.2 * 4.0 / 0.4),
+        ("*DFLUX\nTIP, S, 0.2\n", 20.0 + 0.2 * 4.0 / 0.4),
+        ("*DFLUX\nBAR, BF, 0.2\n", 20.0 + 0.2 * 8.0 / 0.4),
+        ("*DFLUX\nLAST, BF, 0.2\n", 20.0 + 0.2 * 3.5 / 0.4),
+        ("*CFLUX\nBAR_X1, 11, 0.05\n", 20.0 + 0.2 * 4.0 / 0.4),
+        ("*CFLUX\nBAR_X1, 11, 7.\nBAR_X1, 0, 0.05\n", 20.0 + 0.2 * 4.0 / 0.4),
+        ("*FILM\n4, F4, 100., 0.3\n", 20.0 + 80.0 * 0.3 / (0.3 + 0.1)),
+        ("*FILM\nTIP, F, 100., 0.3\n", 20.0 + 80.0 * 0.3 / (0.3 + 0.1)),
+        ("*FILM\nTIP, F, 7., 9.\n*FILM\n4, F4, 100., 0.3\n", 20.0 + 80.0 * 0.3 / (0.3 + 0.1)),
+    ],
+)
+def test_loads_heat_a_bar_as_in_closed_form(tmp_path: Path, load: str, expected: float) -> None:
+    named = "*SURFACE, NAME=TIP\n4, S4\n*ELSET, ELSET=LAST\n4\n"
+    assert at_end(tmp_path, load, BAR + named) == pytest.approx(expected, rel=1e-10)
+
+
+def test_a_face_radiates_with_the_constants_of_the_deck(tmp_path: Path) -> None:
+    end = at_end(tmp_path, "*RADIATE\n4, R4, 900., 0.8\n", BAR + CONSTANTS)
+    assert end > 25.0
+    gained = 0.8 * 5.67e-11 * ((900.0 + 273.15) ** 4 - (end + 273.15) ** 4)
+    assert 0.1 * (end - 20.0) == pytest.approx(gained, rel=1e-9)
+
+
+def test_elements_of_heat_and_of_mechanics_conduct_alike(tmp_path: Path) -> None:
+    ends = [
+        at_end(tmp_path, "*DFLUX\n4, S4, 0.2\n", BAR.replace("C3D8", kind))
+        for kind in ("DC3D8", "C3D8R", "C3D8I")
+    ]
+    assert ends == pytest.approx([22.0] * 3, rel=1e-10)
+
+
+def test_conductivity_follows_the_temperature(tmp_path: Path) -> None:
+    # k = 0.4 + 0.001 (T − 20): the integral of k from 20 to T is q L.
+    given = BAR.replace("*CONDUCTIVITY\n0.4\n", "*CONDUCTIVITY\n0.4, 20.\n1.4, 1020.\n")
+    rise = at_end(tmp_path, "*DFLUX\n4, S4, 20.\n", given) - 20.0
+    assert 0.4 * rise + 0.0005 * rise**2 == pytest.approx(20.0 * 4.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("card", "along"),
+    [
+        ("*CONDUCTIVITY, TYPE=ORTHO\n0.4, 7., 9.\n", 0.4),
+        ("*CONDUCTIVITY, TYPE=ANISO\n0.4, 7., 9., 0., 0., 0.5\n", 0.4),
+        ("*CONDUCTIVITY, TYPE=ORTHO\n7., 0.5, 9.\n", 0.5),
+    ],
+)
+def test_conductivity_has_axes(tmp_path: Path, card: str, along: float) -> None:
+    axes = "*ORIENTATION, NAME=TURNED\n0., 1., 0., -1., 0., 0.\n" if along == 0.5 else ""
+    section = SECTION.replace("\n", ", ORIENTATION=TURNED\n") if axes else SECTION
+    model = MESH + COPPER.replace("*CONDUCTIVITY\n0.4\n", card) + axes + section
+    assert at_end(tmp_path, "*DFLUX\n4, S4, 0.2\n", model) == pytest.approx(20.0 + 0.8 / along, rel=1e-10)
+
+
+def test_plane_bodies_have_their_thickness_and_rings_their_turn(tmp_path: Path) -> None:
+    mesh = mesh_cards({"BAR": quadratic(rectangle((1, 0), (5, 1), (4, 1)))}, element="DC2D8")
+    section = SECTION + "2.5\n"
+    held = "*BOUNDARY\nBAR_X0, 11, , 20.\nBAR_X1, 11, , 60.\n"
+    found, (plane,) = solved(tmp_path, mesh + COPPER + section + steady(held))
+    assert found.bodies["BAR"].thickness == 2.5
+    heat = [value for name, value in plane.balance.by_part.items() if name.startswith("Held")]
+    assert sorted(heat) == pytest.approx([-10.0, 10.0], rel=1e-10)
+    found, (ring,) = solved(tmp_path, mesh.replace("DC2D8", "DCAX8") + COPPER + SECTION + steady(held))
+    heat = [value for name, value in ring.balance.by_part.items() if name.startswith("Held")]
+    assert max(heat) == pytest.approx(2.0 * np.pi * 0.4 * 40.0 / np.log(5.0), rel=1e-3)
+
+
+TWO = (
+    mesh_cards({"LOW": block((0, 0, 0), (1, 1, 2), (1, 1, 2)), "UP": block((0, 0, 2), (1, 1, 4), (2, 2, 2))})
+    + COPPER
+    + "*SOLID SECTION, ELSET=LOW, MATERIAL=COPPER\n*SOLID SECTION, ELSET=UP, MATERIAL=COPPER\n"
+    "*SURFACE, NAME=ABOVE, TYPE=NODE\nUP_Z0\n*SURFACE, NAME=BELOW, TYPE=NODE\nLOW_Z1\n"
+)
+ENDS = "*BOUNDARY\nLOW_Z0, 11, 11, 0.\nUP_Z1, 11, 11, 100.\n"
+PAIR = "*CONTACT PAIR, INTERACTION=DRY, TYPE=SURFACE TO SURFACE\nABOVE, BELOW\n"
+DRY = "*SURFACE INTERACTION, NAME=DRY\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1.E6\n"
+
+
+@pytest.mark.parametrize(
+    ("joint", "resistance"),
+    [
+        ("*TIE, NAME=GLUE\nABOVE, BELOW\n", 10.0),
+        (DRY + "*GAP CONDUCTANCE\n0.1\n" + PAIR, 20.0),
+        (DRY + "*GAP CONDUCTANCE\n0.5, 10.\n0.1, 0.\n" + PAIR, 20.0),
+    ],
+)
+def test_heat_passes_between_bodies(tmp_path: Path, joint: str, resistance: float) -> None:
+    _, (state,) = solved(tmp_path, TWO + joint + steady(ENDS))
+    heat = [value for name, value in state.balance.by_part.items() if name.startswith("Held")]
+    assert max(heat) == pytest.approx(100.0 / resistance, rel=1e-9)
+
+
+def test_pairs_without_a_conductance_pass_nothing_and_say_so(tmp_path: Path) -> None:
+    found, (state,) = solved(tmp_path, TWO + DRY + PAIR + steady(ENDS))
+    assert state.temperature["UP"] == pytest.approx(100.0)
+    assert any(
+        "passes no heat: its interaction has no *GAP CONDUCTANCE" in note for note in found.frame.notes
+    )
+
+
+def test_steps_keep_what_others_do_not_replace(tmp_path: Path) -> None:
+    more = steady("*DFLUX\n4, S4, 0.4\n") + steady("*DFLUX, OP=NEW\n3, S3, 0.\n*CFLUX\nBAR_X1, 11, 0.05\n")
+    more += steady("*CFLUX, OP=NEW\n*BOUNDARY, OP=NEW\nBAR_X1, 11, 11, 5.\n")
+    found, states = solved(tmp_path, BAR + steady(COLD + "*DFLUX\n4, S4, 0.2\n") + more)
+    ends = [temperatures(found, state)[max(found.frame.node_numbers["BAR"])] for state in states]
+    assert ends == pytest.approx([22.0, 24.0, 22.0, 5.0], rel=1e-10)
+    assert states[-1].temperature["BAR"] == pytest.approx(5.0)
+
+
+def test_what_holds_bodies_has_no_effect_on_heat_and_notes_say_so(tmp_path: Path) -> None:
+    held = "*BOUNDARY\nBAR_X0, 1, 3\n*EXPANSION\n1.E-5\n"
+    found, (state,) = solved(tmp_path, MESH + COPPER + held + SECTION + steady(COLD))
+    assert state.temperature["BAR"] == pytest.approx(20.0)
+    assert any(
+        note.startswith("*EXPANSION,") and note.endswith("has no effect on heat")
+        for note in found.frame.notes
+    )
+
+
+REFUSED = {
+    "1, R1CR, 300., 0.8": ("*RADIATE", "R1CR: radiation between the surfaces of a cavity is not solved"),
+    "1, F1FC, 21, 0.8": ("*FILM", "F1FC: fluid networks are not solved"),
+    "1, S1NU, 1.": ("*DFLUX", "S1NU: fluxes and films of user routines are not read"),
+    "1, P1, 1.": ("*DFLUX", "load 'P1' is not supported: give S1, S2, ... of elements"),
+    "1, F1, 20.": ("*FILM", "needs 2 numbers behind 'F1', got 1: add them"),
+    "1, R1, 20., 0.5": ("*RADIATE", r"needs \*PHYSICAL CONSTANTS with ABSOLUTE ZERO="),
+    "BAR_X1, 3, 20.": ("*CFLUX", "needs node or set, 11 and a heat, got component '3'"),
+    "3, S4, 1.": (
+        "*DFLUX",
+        "heat must enter on the boundary of a body, a face of element 3 lies between two",
+    ),
+}
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_loads_that_are_not_solved_are_refused_by_name(tmp_path: Path, line: str) -> None:
+    card, words = REFUSED[line]
+    with pytest.raises(DeckError, match=words):
+        read_heat_deck(deck(tmp_path, BAR + steady(f"{COLD}{card}\n{line}\n")))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (BAR.replace("C3D8", "S8"), "elements of type S8 do not conduct heat here"),
+        (BAR.replace("*CONDUCTIVITY\n0.4\n", ""), r"conducts no heat: add \*CONDUCTIVITY behind it"),
+        (BAR.replace("*CONDUCTIVITY\n0.4\n", "*CONDUCTIVITY\n-1.\n"), "must be positive"),
+        (BAR.replace("*CONDUCTIVITY\n", "*CONDUCTIVITY, TYPE=ODD\n"), "TYPE=ODD is not read"),
+        (BAR.replace("9.E-6\n", "9.E-6, 0.\n8.E-6, 99.\n"), "must not depend on the temperature, as mass is"),
+        (BAR + "*EQUATION\n2\n1, 11, 1., 2, 11, -1.\n", "equations of temperatures are not solved"),
+        (
+            TWO + PAIR + DRY + "*GAP CONDUCTANCE\n1., 0.\n0.5, 3.\n",
+            "lines have a conductance and its pressure",
+        ),
+    ],
+)
+def test_models_that_are_not_solved_are_refused_by_name(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(DeckError, match=words):
+        read_heat_deck(deck(tmp_path, text + steady(ENDS if text.startswith(TWO) else COLD)))
+
+
+def test_decks_of_statics_name_what_conducts(tmp_path: Path) -> None:
+    static = "*STEP\n*STATIC\n*FILM\n1, F1, 20., 1.\n*END STEP\n"
+    with pytest.raises(DeckError, match=r"heat is conducted in decks with \*HEAT TRANSFER"):
+        read_deck(deck(tmp_path, BAR + static))
+    with pytest.raises(DeckError, match="read_heat_deck"):
+        read_deck(deck(tmp_path, BAR + steady(COLD)))
+    with pytest.raises(DeckError, match=r"all steps must be \*HEAT TRANSFER"):
+        read_heat_deck(deck(tmp_path, BAR + steady(COLD) + "*STEP\n*STATIC\n*END STEP\n"))
