@@ -10,7 +10,7 @@ import numpy as np
 from fenics_contact.decks.materials import MaterialCards, axes_of, depends_on_temperature, row_at, table_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.heat.conductance import Conductance, ConductanceTable
-from fenics_contact.heat.properties import Conductor, Property, TemperatureTable
+from fenics_contact.heat.properties import Conductor, GivenProperty, TemperatureTable
 from fenics_contact.readers.deck_cards import Card
 
 #: Place of 11, 22, 33, 12, 13, 23 in a matrix, row by row.
@@ -41,7 +41,7 @@ def conductor_of(cards: MaterialCards, axes: Card | None, dim: int) -> Conductor
         raise error if getattr(error, "card", "") else card.error(str(error)) from error
 
 
-def _capacity(cards: MaterialCards) -> Property | None:
+def _capacity(cards: MaterialCards) -> GivenProperty | None:
     """Return specific heat times density, none where one of them is not given."""
     heat, density = cards.parts.get("SPECIFICHEAT"), cards.parts.get("DENSITY")
     if heat is None or density is None:
@@ -51,7 +51,7 @@ def _capacity(cards: MaterialCards) -> Property | None:
     return _by_temperature(heat, 1, 0, cards.density)
 
 
-def _by_temperature(card: Card, width: int, column: int, factor: float = 1.0) -> Property:
+def _by_temperature(card: Card, width: int, column: int, factor: float = 1.0) -> GivenProperty:
     """Return a column of a table with a temperature behind each row."""
     if not card.lines:
         raise card.error("has no data line: add it")
