@@ -13,6 +13,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact._scene.checks import check_not_negative, check_positive
 from fenics_contact._scene.fields import finite_numbers
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.heat.parts import STEFAN_BOLTZMANN
 
 
@@ -56,6 +57,25 @@ class Conductance(ABC):
     @abstractmethod
     def at(self, touch: Touch) -> np.ndarray:
         """Return h ≥ 0 at points, shape (n,), [power / (length² · degree)]."""
+
+    def require_rising(self, place: str) -> None:
+        """Refuse a law that falls with the pressure: heat that expands bodies would part them.
+
+        `place`: of the contact, in words.
+        """
+        pressure = np.concatenate([[0.0], np.logspace(-12, 12, 241)])
+        one = np.ones(len(pressure))
+        name = type(self).__name__
+        with user_code(f"{name} as a law of conductance"):
+            touch = Touch(pressure, one, 300.0 * one, 300.0 * one, one, one)
+            h = np.asarray(self.at(touch), dtype=np.float64)
+        falls = np.flatnonzero(np.diff(h) < -1e-9 * np.abs(h[1:])) if h.shape == one.shape else [0]
+        if len(falls) or not np.isfinite(h).all():
+            at = int(falls[0]) + 1 if len(falls) else int(np.argmin(np.isfinite(h)))
+            raise InvalidInputError(
+                f"the conductance {name} of {place} must be a number at each point and not fall with the "
+                f"pressure, got {np.ravel(h)[at : at + 1]} at the pressure {pressure[at]:g}: keep it there"
+            )
 
     def __add__(self, other: Conductance) -> Conductance:
         """Return the sum: heat takes both ways."""

@@ -7,9 +7,31 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._scene.pairs import Surface
-from fenics_contact.errors import InfeasibleError
+from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.parts import HeldTemperature
 from fenics_contact.heat.scene import HeatScene
+
+
+def require_agreement(scene: HeatScene) -> None:
+    """Raise where temperatures that are held differ at nodes that they share."""
+    known: dict[str, list[tuple[HeldTemperature, np.ndarray, np.ndarray]]] = {}
+    for held in scene.held:
+        mesh = scene.bodies[held.body].mesh
+        nodes = mesh.nodes_to_hold(held.surface)
+        values = held.values(mesh.points[nodes])
+        for other, theirs, given in known.setdefault(held.body, []):
+            _, here, there = np.intersect1d(nodes, theirs, return_indices=True)
+            apart = np.abs(values[here] - given[there])
+            wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(values[here]), np.abs(given[there])))
+            if len(wrong):
+                at = wrong[0]
+                raise InvalidInputError(
+                    f"temperatures held at {held.place} and {other.place} must agree where both meet, got "
+                    f"{values[here][at]:g} and {given[there][at]:g} at {mesh.points[nodes[here][at]]}: give "
+                    "one of them as a function of points, or hold nodes that they do not share"
+                )
+        known[held.body].append((held, nodes, values))
 
 
 def require_temperatures(scene: HeatScene, joints: Joints, conductance: np.ndarray) -> None:

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact._base.checks import kind_in_words
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.shared import once_a_machine
 from fenics_contact._pairing.points import join_points
-from fenics_contact.errors import ConvergenceError, collectively, together
+from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively, together
 from fenics_contact.feti.all_rows import RowGroups
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
@@ -23,7 +24,7 @@ from fenics_contact.feti.row_groups import Glued
 from fenics_contact.feti.torn import TornSystem, at_rest, numbered
 from fenics_contact.heat.acceleration import Anderson
 from fenics_contact.heat.assembly import Assembly, Heated, Rate
-from fenics_contact.heat.determined import require_temperatures
+from fenics_contact.heat.determined import require_agreement, require_temperatures
 from fenics_contact.heat.forms import HeatForms, Part
 from fenics_contact.heat.joints import Joints
 from fenics_contact.heat.plausible import odd_values, warn_of
@@ -73,6 +74,11 @@ class HeatProblem:
         tolerance: float = TOLERANCE,
     ) -> None:
         """Prepare; nothing is computed yet. Arguments as for `solve_heat`."""
+        if not isinstance(scene, HeatScene):
+            raise InvalidInputError(
+                f"what is solved must be a HeatScene, got {kind_in_words(type(scene))}: scenes of mechanics "
+                "are solved by solve_scene, those of both by solve_heated"
+            )
         self.scene, self.comm, self.tolerance = scene, comm, tolerance
         self.timer, self.state = PhaseTimer(), None
         self._partitions = partitions
@@ -120,6 +126,8 @@ class HeatProblem:
             most: Linear systems after which an iteration is given up.
         """
         scene = scene or self.scene
+        with together(self.comm):
+            require_agreement(scene)
         decomposition = self.decomposition.holding(scene.field)
         HeatForms(decomposition.forms.templates).prepare(scene)
         joints = self.joints(scene)
@@ -356,5 +364,6 @@ def solve_heat(
         >>> state = solve_heat(scene, MPI.COMM_WORLD)  # doctest: +SKIP
         >>> state.temperature["upper"].max()  # doctest: +SKIP
     """
+    problem = HeatProblem(scene, comm, partitions=partitions, tolerance=tolerance)
     warn_of(odd_values(scene), comm)
-    return HeatProblem(scene, comm, partitions=partitions, tolerance=tolerance).solve()
+    return problem.solve()

@@ -80,6 +80,11 @@ class _Held(Support):
         """Return itself."""
         return self
 
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Return the temperatures at points, shape (n, 1)."""
+        (given,) = self.value
+        return HeldTemperature(self.body, self.surface, given).values(points)[:, None]  # type: ignore[arg-type]
+
 
 @displayed
 @dataclass(frozen=True)
@@ -203,6 +208,8 @@ class ThermalContact:
         """Reject obstacles without a temperature."""
         if not isinstance(self.conductance, Conductance):
             object.__setattr__(self, "conductance", EvenConductance(self.conductance))
+        if self.law.by_contact:
+            self.law.require_rising(self.place)
         given: Any = self.temperature
         has = callable(given) or not isnan(given)
         if has == isinstance(self.master, Surface):
@@ -291,6 +298,11 @@ class HeatScene:
             for side in (contact.slave, contact.master):
                 if isinstance(side, Surface):
                     check_known(side.body, meshes, f"ThermalContact names body {side.body!r}, the scene has")
+            if isinstance(contact.master, Surface) and contact.master.body == contact.slave.body:
+                raise InvalidInputError(
+                    f"heat passes between surfaces of two bodies, got {contact.place} of one: split the "
+                    "body and join its parts by a Tie"
+                )
         _ = self.geometry, self.field
 
     def _facts(self) -> dict[str, Any]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import logging
 from typing import Any
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
 from fenics_contact import Body, RigidPlane, Scene, Surface, Tie
-from fenics_contact.errors import InfeasibleError
+from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.heat import (
+    Conductance,
     ConductingBody,
     Conductor,
     Convection,
@@ -24,6 +26,7 @@ from fenics_contact.heat import (
     ThermalContact,
     solve_heat,
 )
+from fenics_contact.heat.conductance import Touch
 from fenics_contact.heat.plausible import odd_power, odd_values
 from fenics_contact.materials import PlaneStrain
 
@@ -132,3 +135,43 @@ def test_power_in_watts_does_not_go_with_moduli_in_newtons_and_millimetres() -> 
     assert "body 'a'? a conductivity of 0.045 is that of a metal in W/(mm K)" in words
     assert words.endswith("power is then in N mm/s and the conductivity 45")
     assert not list(odd_power(scene, bars(2, 45.0)))
+
+
+def plate(x: float = 0.0) -> ConductingBody:
+    """Return a plate with odd numbers of cells."""
+    return ConductingBody(rectangle((x, 0.0), (x + 1.0, 1.0), (3, 3)), Conductor(1.0))
+
+
+def test_temperatures_that_meet_and_differ_are_named():
+    held = [HeldTemperature("a", "x0", 1.0), HeldTemperature("a", "y0", 2.0)]
+    with pytest.raises(InvalidInputError, match="a y0 and a x0 must agree where both meet, got 2 and 1"):
+        solve_heat(HeatScene({"a": plate()}, held), MPI.COMM_SELF)
+    along = HeldTemperature("a", "y0", lambda x: 1.0 + x[:, 0])
+    state = solve_heat(HeatScene({"a": plate()}, [held[0], along]), MPI.COMM_SELF)
+    assert state.values.max() == pytest.approx(2.0)
+
+
+def test_a_function_of_held_temperatures_is_named_as_one():
+    held = [HeldTemperature("a", "x0", lambda x: x)]
+    with pytest.raises(InvalidInputError, match="HeldTemperature on a x0 must return"):
+        solve_heat(HeatScene({"a": plate()}, held), MPI.COMM_SELF)
+
+
+def test_a_law_of_your_own_must_not_fall_with_the_pressure():
+    class Falling(Conductance):
+        def at(self, touch: Touch) -> np.ndarray:
+            return 1.0 / (1.0 + touch.pressure)
+
+    with pytest.raises(InvalidInputError, match="Falling of a x1 - b x0 must be a number at each point and"):
+        ThermalContact(Surface("a", "x1"), Surface("b", "x0"), Falling())
+
+
+def test_heat_does_not_pass_between_surfaces_of_one_body():
+    contact = ThermalContact(Surface("a", "x1"), Surface("a", "y1"), 1.0)
+    with pytest.raises(InvalidInputError, match="surfaces of two bodies, got a x1 - a y1 of one: split"):
+        HeatScene({"a": plate()}, contacts=[contact])
+
+
+def test_only_scenes_of_heat_are_solved_for_temperatures():
+    with pytest.raises(InvalidInputError, match="must be a HeatScene, got an int"):
+        solve_heat(3, MPI.COMM_SELF)
