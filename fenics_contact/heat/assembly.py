@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import is_
 
 import numpy as np
 import scipy.sparse as sp
@@ -45,6 +46,11 @@ class Heated:
     stored: Exchange
 
 
+def _same(matrices: list[sp.csr_matrix], others: list[sp.csr_matrix]) -> bool:
+    """Return whether they are the same objects; both lists hold theirs, so that no other takes its place."""
+    return len(matrices) == len(others) and all(map(is_, matrices, others))
+
+
 class Assembly:
     """Assembles one subdomain, again and again."""
 
@@ -52,7 +58,7 @@ class Assembly:
         """Prepare; nothing is assembled yet."""
         self.part = part
         self._known: dict[HeatLoad, Exchange] = {}
-        self._last: tuple[object, Subdomain] | None = None
+        self._last: tuple[list[sp.csr_matrix], Subdomain] | None = None
 
     @cached_property
     def _conduction(self) -> sp.csr_matrix:
@@ -80,13 +86,13 @@ class Assembly:
         exchanges = {k: self._exchange(load, temperature[nodes]) for k, load in acting.items()}
         stored = self._stored(rate, temperature[nodes], rate.before[nodes], number)
         bed = sum((each.matrix for each in exchanges.values()), stored.matrix)
-        key = tuple(id(each.matrix) for each in (*exchanges.values(), stored) if each.matrix.nnz)
+        beds = [each.matrix for each in (*exchanges.values(), stored) if each.matrix.nnz]
         load = sum((each.load for each in exchanges.values()), stored.load + part.portion * friction[nodes])
         if not np.isfinite(load).all():
             raise InvalidInputError(f"heat on {part.name} must be finite, got {load}: check loads and laws")
-        if not linear or self._last is None or self._last[0] != key:
+        if not linear or self._last is None or not _same(self._last[0], beds):
             conduction = self._conduction if linear else part.conduction(temperature[nodes])
-            self._last = key, self._subdomain(conduction, bed.tocsr())
+            self._last = beds, self._subdomain(conduction, bed.tocsr())
         force = part.mesh.following.force(load)
         return Heated(replace(self._last[1], load=force), exchanges, stored)
 
