@@ -27,6 +27,7 @@ from fenics_contact.pictures.canvas import (
     BLUE,
     GREY,
     INK,
+    LEVEL_MAP,
     ORANGE,
     PRESSURE_MAP,
     SIGNED_MAP,
@@ -103,6 +104,7 @@ def colour_scales() -> dict[str, list[list[float | str]] | list[str] | str]:
         "size": _samples(STRESS_MAP),
         "contact": _samples(PRESSURE_MAP),
         "signed": _samples(SIGNED_MAP),
+        "level": _samples(LEVEL_MAP),
         "status": [GREY, BLUE, ORANGE],
         "line": INK,
         "obstacle": GREY,
@@ -122,6 +124,7 @@ def sections(record: Record, units: Units) -> str:
         "Summary": _rows(_summary(record, units)),
         "Accuracy": _meshes(record),
         "Contact": _contact(record, units),
+        "Heat": _rows(_heat(record, units)),
         "Load steps": _steps(record, units),
         "Rigid surfaces": _rows(_motions(record, units)),
         "Springs": _rows(_springs(record, units)),
@@ -218,7 +221,8 @@ def _contact(record: Record, units: Units) -> str:
         rows.append(("contact", f"{_side(pair.get('slave'))} on {_side(pair.get('master'))}"))
         named = zip(("open", "stick", "slip"), status_words([pair]), strict=True)
         states = [f"{entry[name]} {word}" for name, word in named if word and name in entry]
-        rows.append(("points", f"{number(entry.get('points'))}: {', '.join(states)}"))
+        count = number(entry.get("points"))
+        rows.append(("points", f"{count}: {', '.join(states)}" if states else count))
         rows += [
             (words, f"{number(entry[name])} {unit}")
             for name, words, unit in (
@@ -231,10 +235,25 @@ def _contact(record: Record, units: Units) -> str:
                 ("largest_slip", "largest slip of the last step", units.length),
                 ("worn_volume", "worn volume", derived.volume),
                 ("worn_depth", "largest worn depth", units.length),
+                ("heat", "heat into the master", units.power),
+                ("largest_flux", "largest heat flux", units.flux),
+                ("largest_jump", "largest jump of the temperature", units.temperature),
             )
             if entry.get(name) is not None
         ]
     return _table((), rows, words=2) if rows else ""
+
+
+def _heat(record: Record, units: Units) -> dict[str, Any]:
+    """Return temperatures of bodies, and where heat comes from."""
+    facts: dict[str, Any] = {
+        f"temperature of {name}": f"{number(least)} to {number(largest)} {units.temperature}"
+        for name, (least, largest) in (record.get("temperature") or {}).items()
+    }
+    balance = record.get("heat_balance") or {}
+    heat = {**balance.get("parts", {}), "stored": balance.get("stored", 0.0)} if balance else {}
+    facts |= {name: f"{number(value)} {units.power}" for name, value in heat.items()}
+    return facts | {"error of the balance": balance.get("error")}
 
 
 def status_words(pairs: Sequence[Record]) -> tuple[str, str, str]:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from fenics_contact.output.cad import CadError, write_step
     from fenics_contact.output.files import OutputError, only_run_in, write_json, write_text
     from fenics_contact.output.frd import write_frd
+    from fenics_contact.output.heat import write_heat_balance
     from fenics_contact.output.paraview import ResultSeries, write_xdmf
     from fenics_contact.output.result import read_result, versions, write_optimisation_result
     from fenics_contact.output.surfaces import write_design_table, write_stl
@@ -27,6 +28,7 @@ __all__ = [
     "write_contact_table",
     "write_design_table",
     "write_frd",
+    "write_heat_balance",
     "write_json",
     "write_optimisation_result",
     "write_step",

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -18,6 +19,7 @@ from fenics_contact.mesh.collapsed import by_shape
 from fenics_contact.output.files import replacing
 from fenics_contact.output.result import own_version
 from fenics_contact.results.fields import ContactNodes, in_space
+from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
@@ -93,7 +95,11 @@ class FrdField:
         "FORC": ("F1", "F2", "F3"),
         "PE": ("PE",),
         "CONTACT": ("COPEN", "CSLIP1", "CSLIP2", "CPRESS", "CSHEAR1", "CSHEAR2"),
+        "NDTEMP": ("T",),
+        "FLUX": ("F1", "F2", "F3"),
     }
+    #: Names of those that all results but states have, by that of their fields on nodes.
+    others: ClassVar[Mapping[str, str]] = {"temperature": "NDTEMP", "nodal_heat_flux": "FLUX"}
 
     @property
     def text(self) -> str:
@@ -168,7 +174,7 @@ def _time(time: float) -> str:
 
 
 @naming_arguments
-def write_frd(path: str | Path, states: State | Sequence[State], times: Sequence[float] = ()) -> Path:
+def write_frd(path: str | Path, states: OnBodies | Sequence[OnBodies], times: Sequence[float] = ()) -> Path:
     """Write states as CalculiX writes its results, for cgx, FreeCAD, PrePoMax and converters.
 
     Nodes and cells are numbered from 1 body by body, materials are named by bodies. On nodes are DISP,
@@ -176,9 +182,9 @@ def write_frd(path: str | Path, states: State | Sequence[State], times: Sequence
     is contact, CONTACT: COPEN is the gap, CSLIP the slip since the
     undeformed state with its elastic part, CPRESS the pressure and CSHEAR the friction on the master, along
     the projection of the axis x on the surface (of z where x is normal) and across it; at nodes of slaves,
-    zero at others. Numbers
-    have six digits. Stresses and strains are extrapolated from the Gauss points of each cell to its nodes and
-    averaged over all cells around a node, as CalculiX does: at surfaces less accurate than
+    zero at others. A `HeatState` has NDTEMP, its temperature, and FLUX, the heat flux. Numbers have six
+    digits. Stresses and strains are extrapolated from the Gauss points of each cell to its nodes and averaged
+    over all cells around a node, as CalculiX does: less accurate at surfaces than
     `State.gather_nodal_stress`. FORC is `State.gather_internal_forces`. Complete quadratic cells are written
     without their centres and the forces there, pyramids as linear hexahedra.
 
@@ -201,14 +207,14 @@ def write_frd(path: str | Path, states: State | Sequence[State], times: Sequence
     Example:
         >>> write_frd("block.frd", solve_scene(scene, comm))  # doctest: +SKIP
     """
-    several = [states] if isinstance(states, State) else list(states)
+    several = [states] if isinstance(states, OnBodies) else list(states)
     if not several:
         raise InvalidInputError("write_frd needs at least one state, got none: solve a scene or its steps")
     given = list(times) or list(range(1, len(several) + 1))
     if len(given) != len(several):
         raise InvalidInputError(f"times must have one for each of {len(several)} states, got {len(given)}")
-    comm, numbering = several[0].torn.decomposition.comm, BodyNumbers.of(several[0])
-    bodies = several[0].scene.bodies
+    comm, numbering = several[0].comm, BodyNumbers.of(several[0])
+    bodies = several[0].geometry.bodies
     remembers = any(has_history(material) for body in bodies.values() for material in body.materials)
     kinds = [kind for kind in FrdField.kinds if kind != "PE" or remembers]
     with writing(comm, Path(path), numbering.mesh, list(bodies)) as writer:
@@ -259,10 +265,10 @@ class BodyNumbers:
     thickness: float = 1.0
 
     @classmethod
-    def of(cls, state: State) -> BodyNumbers:
+    def of(cls, state: OnBodies) -> BodyNumbers:
         """Return those of a scene: body by body."""
         nodes, cells, points, first, count = {}, [], [], 0, 0
-        for name, body in state.scene.deforming.items():
+        for name, body in state.geometry.deforming.items():
             mesh, own = body.mesh, list[np.ndarray]()
             for shape, (_, part) in by_shape(mesh.cells, mesh.dim).items():
                 own.append(_lean(shape, part, mesh.dim))
@@ -298,24 +304,42 @@ def _lean(shape: str, nodes: np.ndarray, dim: int) -> np.ndarray:
     return nodes[:, : max(each for each in there if each in corners.get(shape, (4, 10)))]
 
 
-def nodal_fields(state: State, numbering: BodyNumbers, kinds: Sequence[str]) -> list[FrdField]:
+def nodal_fields(state: OnBodies, numbering: BodyNumbers, kinds: Sequence[str]) -> list[FrdField]:
     """Return the fields of a state by the kinds of `FrdField` that are asked for. Collective."""
-    scene, numbers = state.scene, numbering.mesh.numbers
-    bodies, found = scene.deforming, dict[str, np.ndarray]()
+    bodies, numbers = state.geometry.deforming, numbering.mesh.numbers
     ones = numbering.summed({name: np.ones((body.mesh.n_nodes, 1)) for name, body in bodies.items()})
+    found = _values(state, numbering, kinds, np.maximum(ones, 1.0))
+    return [
+        FrdField(kind, numbers, found[kind]) for kind in FrdField.kinds if kind in kinds and kind in found
+    ]
+
+
+@singledispatch
+def _values(
+    state: OnBodies, numbering: BodyNumbers, kinds: Sequence[str], count: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return values at nodes by kind; `count`: bodies that share each node, (n, 1). Collective."""
+    fields = {name: state.gather_fields(name).points for name in state.geometry.deforming}
+    return {
+        kind: in_space(numbering.summed({name: own[key] for name, own in fields.items()}) / count)
+        for key, kind in FrdField.others.items()
+    }
+
+
+@_values.register
+def _(state: State, numbering: BodyNumbers, kinds: Sequence[str], count: np.ndarray) -> dict[str, np.ndarray]:
+    bodies, found = state.scene.deforming, dict[str, np.ndarray]()
     if "DISP" in kinds:
         moved = numbering.summed({name: state.gather_displacement(name) for name in bodies})
-        found["DISP"] = in_space(moved / np.maximum(ones, 1.0))
+        found["DISP"] = in_space(moved / count)
     if {"STRESS", "TOSTRAIN", "PE"} & set(kinds):
         found |= _on_nodes(state, numbering, kinds)
     if "FORC" in kinds:
         forces = numbering.summed({name: state.gather_internal_forces(name) for name in bodies})
         found["FORC"] = in_space(forces * numbering.thickness)
-    if "CONTACT" in kinds and scene.contacts:
+    if "CONTACT" in kinds and state.scene.contacts:
         found["CONTACT"] = numbering.summed({name: contact_values(state, name) for name in bodies})
-    return [
-        FrdField(kind, numbers, found[kind]) for kind in FrdField.kinds if kind in kinds and kind in found
-    ]
+    return found
 
 
 def _on_nodes(state: State, numbering: BodyNumbers, kinds: Sequence[str]) -> dict[str, np.ndarray]:

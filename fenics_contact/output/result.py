@@ -42,7 +42,7 @@ from fenics_contact.results.contact import Status, worn_from
 from fenics_contact.results.forces import Resultant
 from fenics_contact.results.joints import joint_results
 from fenics_contact.results.linear_state import as_linear
-from fenics_contact.results.on_bodies import OnBodies, Recorded
+from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.rigid_motions import UnheldMotion
 from fenics_contact.results.state import State
 
@@ -336,9 +336,8 @@ def result_record(
 
 @singledispatch
 def _record(state: Any, errors: bool) -> dict[str, Any]:
-    """Return head and parts of the record of a result, by default one that is `Recorded`. Collective."""
-    result: Recorded = state
-    return {**_head(result.kind, result.comm), **readable(result.record())}
+    """Return head and parts of the record of a result, by default one that has them itself. Collective."""
+    return {**_head(state.kind, state.comm), **readable(state.record())}
 
 
 @_record.register

@@ -6,6 +6,7 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from fenics_contact.results.area import contact_area
 from fenics_contact.results.contact import Status, worn_from
 from fenics_contact.results.forces import Balance, Resultant
 from fenics_contact.results.joints import joint_results
+from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
@@ -28,9 +30,9 @@ if TYPE_CHECKING:
     from fenics_contact._scene.pairs import ContactPair
 
 
-@collectively("write_contact_table", lambda state, *_, **__: state.torn.decomposition.comm)
+@collectively("write_contact_table", lambda state, *_, **__: state.comm)
 @naming_arguments
-def write_contact_table(state: State, path: str | Path, *, pair: int | str | None = None) -> Path:
+def write_contact_table(state: OnBodies, path: str | Path, *, pair: int | str | None = None) -> Path:
     """Write what happens at every contact point as a table (CSV). Collective.
 
     After a remark that begins with "#", a line names the columns, in the plane without those of z:
@@ -49,7 +51,9 @@ def write_contact_table(state: State, path: str | Path, *, pair: int | str | Non
     | ``wet`` | 1 where fluid has reached it, else 0; only where a pair has a fluid |
     | ``worn_depth`` | lost by both surfaces since the start, [length]; only where a pair wears |
 
-    Rows are in the order of pairs and nodes, on any number of ranks.
+    That of a `HeatState` has ``contact``, ``node``, ``x``, ..., the temperatures of ``slave`` and ``master``,
+    ``conductance``, and from slave to master ``heat``, [power], and ``flux``, [power / length²]. Rows are in
+    the order of pairs and nodes, on any number of ranks.
 
     Args:
         state: The state.
@@ -65,24 +69,31 @@ def write_contact_table(state: State, path: str | Path, *, pair: int | str | Non
     Example:
         >>> write_contact_table(state, "output/contact.csv", pair="lid bottom")  # doctest: +SKIP
     """
-    scene, comm, target = state.scene, state.torn.decomposition.comm, Path(path)
+    comm, target = state.comm, Path(path)
     with together(comm):
-        chosen = None if pair is None else pair_number(scene.contacts, pair)
-    moved = {name: state.gather_displacement(name) for name in scene.bodies}
+        chosen = None if pair is None else pair_number(state.geometry.contacts, pair)
+    number, columns = _contact_columns(state)
     with together(comm):
         if comm.rank == 0:
-            columns = _contact_columns(state, np.concatenate(list(moved.values())))
-            mine = np.lexsort((state.contact.points.slave, state.contact.points.pair))
-            rows = mine if chosen is None else mine[state.contact.points.pair[mine] == chosen]
+            mine = np.lexsort((columns["node"], number))
+            rows = mine if chosen is None else mine[number[mine] == chosen]
             remark = "one row a contact point; forces by area act on the slave; units are those of the scene"
             table = zip(*([values[row] for row in rows] for values in columns.values()), strict=True)
             write_text(target, csv_text([remark], list(columns), table))
     return target
 
 
-def _contact_columns(state: State, displacement: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the columns of a contact table; `displacement`: of the nodes of all bodies, (n_nodes, dim)."""
+@singledispatch
+def _contact_columns(state: Any) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return the pair of each contact point and the columns of the table, by default its own. Collective."""
+    own: tuple[np.ndarray, dict[str, np.ndarray]] = state.contact_columns()
+    return own
+
+
+@_contact_columns.register
+def _(state: State) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     scene, contact, points = state.scene, state.contact, state.contact.points
+    displacement = np.concatenate([state.gather_displacement(name) for name in scene.bodies])
     numbers = state.torn.decomposition.tearing
     first = [numbers.first_of(pair.slave.body) for pair in scene.contacts]
     offset = np.array(first, dtype=int)[points.pair]
@@ -104,7 +115,7 @@ def _contact_columns(state: State, displacement: np.ndarray) -> dict[str, np.nda
     }
     kinds = zip(points.pair, contact.status, strict=True)
     status = [_status(scene.contacts[pair], kind) for pair, kind in kinds]
-    return {
+    return points.pair, {
         "pair": np.array([pair.place for pair in scene.contacts], dtype=object)[points.pair],
         "node": points.slave - offset,
         **split[""],

@@ -58,6 +58,10 @@ STRESS_MAP = ListedColormap(colormaps["magma_r"](np.linspace(0.04, 0.82, 256)), 
 ERROR_MAP = colormaps["viridis_r"]
 PRESSURE_MAP = colormaps["YlGnBu"]  #: Sizes other than stresses.
 SIGNED_MAP = colormaps["PuOr"]  #: Values of both signs, with zero in its middle.
+#: Levels without a zero, such as temperatures: cold is dark, hot is bright.
+LEVEL_MAP = ListedColormap(colormaps["inferno"](np.linspace(0.25, 0.97, 256)), "level")
+#: Colours of a field by their kind in `field_entries`.
+MAPS = {"size": STRESS_MAP, "signed": SIGNED_MAP, "level": LEVEL_MAP, "status": STRESS_MAP}
 
 
 #: Largest width on the screen, in its own units.
@@ -472,11 +476,25 @@ class Units:
         length: Unit of coordinates and displacements.
         force: Unit of forces.
         stress: Unit of stresses and pressures, force / length².
+        temperature: Unit of temperatures.
+        power: Unit of heat that flows; where heat is coupled to N and mm this is "N mm/s".
     """
 
     length: str = "mm"
     force: str = "N"
     stress: str = "MPa"
+    temperature: str = "K"
+    power: str = "W"
+
+    @property
+    def flux(self) -> str:
+        """Unit of heat flux, power / length²."""
+        return f"{self.power}/{self.length}²"
+
+    @property
+    def conductance(self) -> str:
+        """Unit of conductances, power / (length² · degree)."""
+        return f"{self.power}/({self.length}² {self.temperature})"
 
 
 #: Of colours; () for one to be chosen.

@@ -170,15 +170,21 @@ _KNOWN = {
     "displacement": ("at nodes", "displacement", "length"),
     "nodal_stress": ("at nodes", "stress", "stress"),
     "nodal_principal_stress": ("at nodes", "principal stress", "stress"),
+    "temperature": ("at nodes", "temperature", "temperature"),
+    "nodal_heat_flux": ("at nodes", "heat flux", "flux"),
     "contact_status": ("contact", "contact status", ""),
     "contact_pressure": ("contact", "contact pressure", "stress"),
     "contact_nominal_pressure": ("contact", "contact pressure by undeformed area", "stress"),
     "contact_force": ("contact", "contact force of a node", "force"),
     "contact_worn_depth": ("contact", "worn depth", "length"),
     "contact_slip": ("contact", "slip in the last load step", "length"),
+    "contact_heat_flux": ("contact", "heat flux into the master", "flux"),
+    "contact_temperature_jump": ("contact", "jump of the temperature", "temperature"),
+    "contact_conductance": ("contact", "conductance", "conductance"),
     "von_mises": ("means over cells", "von Mises stress of cells", "stress"),
     "stress": ("means over cells", "stress of cells", "stress"),
     "principal_stress": ("means over cells", "principal stress of cells", "stress"),
+    "heat_flux": ("means over cells", "heat flux of cells", "flux"),
 }
 
 
@@ -187,7 +193,7 @@ def field_entries(steps: Sequence[Bodies], units: Units) -> list[dict[str, Any]]
 
     Each entry has its ``name``, ``part`` of the menu, ``source``, the name in the files, ``component``, a
     column, or −1 for the size of a vector, ``label`` and ``unit``, ``place``, "nodes" or "on_cells",
-    ``contact``, whether it lives on slave surfaces, ``colours``, "size" or "signed" or "status", ``range``
+    ``contact``, whether it lives on slave surfaces, ``colours``, one of `MAPS`, ``range``
     of the colours, and ``extremes``, the smallest and largest value of each step.
     """
     found: dict[str, tuple[str, int]] = {}
@@ -234,7 +240,12 @@ def _range(steps: Sequence[Bodies], entry: Mapping[str, Any]) -> dict[str, Any]:
     if entry["source"] == "contact_status":
         return {"colours": "status", "range": [0.0, 1.0], "extremes": [None] * len(steps)}
     values = [_values(grids, entry) for grids in steps]
-    return range_of(values, values)
+    found = range_of(values, values)
+    if entry["source"] == "temperature":  # it has no zero
+        ends = [part for part in found["extremes"] if part]
+        low, high = min(low for low, _ in ends), max(high for _, high in ends)
+        found |= {"colours": "level", "range": [low, high if high > low else low + 1.0]}
+    return found
 
 
 def range_of(

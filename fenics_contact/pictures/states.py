@@ -22,9 +22,9 @@ from fenics_contact.pictures.canvas import (
     ERROR_MAP,
     GREY,
     INK,
+    MAPS,
     PALE,
     PRESSURE_MAP,
-    SIGNED_MAP,
     STRESS_MAP,
     Picture,
     Range,
@@ -296,9 +296,11 @@ def plot_field(
     ends = (-1.0, 2.0) if is_status else entry["extremes"][0] or (0.0, 0.0)
     words = f"{entry['label']} ({entry['unit']})" if entry["unit"] else entry["label"]
     facts = f"{entry['label']}, {written(ends[0])} to {written(ends[1])} {entry['unit']}".rstrip()
-    colours = SIGNED_MAP if entry["colours"] == "signed" else STRESS_MAP
+    colours = MAPS[entry["colours"]]
     norm = Normalize(*(given or (ends if is_status else entry["range"])))
-    head = headline(title, f"{facts}; displacement × {scale:g}")
+    if any("displacement" in body.point_data for body in drawn.values()):
+        facts = f"{facts}; displacement × {scale:g}"
+    head = headline(title, facts)
     axes = axes_of(state.geometry) if state else ("x", "y")
     coloured = ColouredField(values, colours, norm, words, head, float(scale), 0.0, named, width, axes)
     obstacles = obstacles_of(state) if state else []

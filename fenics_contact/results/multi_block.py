@@ -53,7 +53,7 @@ def multi_block(
         for key, values in fields.points.items():
             grid.point_data[key] = in_space(values)
         for key, values in fields.cells.items():
-            grid.cell_data[key] = values[whole.cells_cut] if linear else values
+            grid.cell_data[key] = in_space(values[whole.cells_cut] if linear else values)
         blocks[name] = grid
     return blocks
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.scene import Scene
@@ -88,14 +87,3 @@ class OnBodies(ABC):
         for name in meshes:
             blocks[name] = turned_around(blocks[name], revolved)
         return blocks
-
-
-class Recorded(OnBodies):
-    """One that says itself what a file of results has of it."""
-
-    #: What it is, in a word.
-    kind: str
-
-    @abstractmethod
-    def record(self) -> Mapping[str, Any]:
-        """Return what was found as plain data. Collective."""
