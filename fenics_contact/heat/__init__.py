@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         HeldTemperature,
         Radiation,
     )
+    from fenics_contact.heat.plan import HeatPlan
     from fenics_contact.heat.problem import HeatProblem, solve_heat
     from fenics_contact.heat.properties import Conductor, TemperatureTable
     from fenics_contact.heat.scene import ConductingBody, HeatScene, ThermalContact
@@ -41,6 +42,7 @@ __all__ = [
     "HeatAtNodes",
     "HeatBalance",
     "HeatFlux",
+    "HeatPlan",
     "HeatProblem",
     "HeatScene",
     "HeatSource",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isnan, nan
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -29,6 +31,9 @@ from fenics_contact.heat.parts import HeatLoad, HeldTemperature, Value
 from fenics_contact.heat.properties import Conductor
 from fenics_contact.materials.elastic import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh.body_mesh import BodyMesh
+
+if TYPE_CHECKING:
+    from fenics_contact.heat.plan import HeatPlan
 
 
 @dataclass(frozen=True)
@@ -340,6 +345,26 @@ class HeatScene:
             for name, body in self.bodies.items()
         }
         return Scene(bodies, supports=[_Held(each.body, each.surface, (each.value,)) for each in self.held])
+
+    def effects(self) -> dict[str, int]:
+        """Return how many parts of the scene have each physical effect, by its name."""
+        parts = (*self.bodies.values(), *self.held, *self.loads, *self.contacts, *self.ties)
+        names = [re.sub("(?<=[a-z])(?=[A-Z])", " ", type(each).__name__).lower() for each in parts]
+        names += ["body of revolution" for body in self.bodies.values() if body.axisymmetric]
+        varying = [not each.is_linear for each in (*self.bodies.values(), *self.loads)]
+        varying += [each.law.by_temperature for each in self.contacts]
+        return dict(Counter([*names, *["law that depends on the temperature"] * sum(varying)]))
+
+    def plan(self, partitions: Mapping[str, np.ndarray] | None = None, *, ranks: int = 1) -> HeatPlan:
+        """Return what will be built: unknowns, rows, memory; arguments as for `Scene.plan`.
+
+        Example:
+            >>> print(scene.plan())  # doctest: +SKIP
+        """
+        from fenics_contact.heat.plan import make_plan
+
+        places, cut = [each.place for each in self.contacts], partitions or self.field.partition(ranks)
+        return make_plan(self.field, self.geometry, self.effects(), places, cut, ranks)
 
     @property
     def levels(self) -> tuple[float, ...]:
