@@ -18,6 +18,7 @@ from fenics_contact.feti.subdomain import CachedMatrix, Subdomain
 from fenics_contact.heat.exchange import Exchange
 from fenics_contact.heat.forms import Part
 from fenics_contact.heat.parts import HeatLoad
+from fenics_contact.heat.properties import Conductor
 from fenics_contact.heat.scene import HeatScene
 
 
@@ -38,12 +39,14 @@ class Rate:
 class Heated:
     """A subdomain at some temperature.
 
-    `exchanges`: with each load that acts on it, by its number; `stored`: the heat that goes into it.
+    `exchanges`: with each load that acts on it, by its number; `stored`: the heat that goes into it;
+    `stiffened`: by which factor films, storage and the temperature have changed the diagonal, (n,).
     """
 
     subdomain: Subdomain
     exchanges: Mapping[int, Exchange]
     stored: Exchange
+    stiffened: np.ndarray
 
 
 def _same(matrices: list[sp.csr_matrix], others: list[sp.csr_matrix]) -> bool:
@@ -58,12 +61,20 @@ class Assembly:
         """Prepare; nothing is assembled yet."""
         self.part = part
         self._known: dict[HeatLoad, Exchange] = {}
-        self._last: tuple[list[sp.csr_matrix], Subdomain] | None = None
+        self._last: tuple[list[sp.csr_matrix], Subdomain, np.ndarray] | None = None
 
     @cached_property
     def _conduction(self) -> sp.csr_matrix:
         """K of a body whose conductivity is constant."""
         return self.part.conduction(np.zeros(self.part.mesh.size))
+
+    @cached_property
+    def _typical(self) -> np.ndarray:
+        """The diagonal of K at the conductivity by which bodies are compared."""
+        linear, size = self.part.body.is_linear, self.part.mesh.size
+        compared = np.full(size, Conductor.compared_at)
+        conduction = self._conduction if linear else self.part.conduction(compared)
+        return np.asarray(self.part.mesh.following.stiffness(conduction).diagonal())
 
     @cached_property
     def _capacity(self) -> sp.csr_matrix:
@@ -92,9 +103,10 @@ class Assembly:
             raise InvalidInputError(f"heat on {part.name} must be finite, got {load}: check loads and laws")
         if not linear or self._last is None or not _same(self._last[0], beds):
             conduction = self._conduction if linear else part.conduction(temperature[nodes])
-            self._last = beds, self._subdomain(conduction, bed.tocsr())
+            self._last = beds, *self._subdomain(conduction, bed.tocsr())
+        _, subdomain, stiffened = self._last
         force = part.mesh.following.force(load)
-        return Heated(replace(self._last[1], load=force), exchanges, stored)
+        return Heated(replace(subdomain, load=force), exchanges, stored, stiffened)
 
     def _exchange(self, load: HeatLoad, temperature: np.ndarray) -> Exchange:
         if not load.is_linear:
@@ -120,15 +132,17 @@ class Assembly:
             known[factor] = (factor * matrix).tocsr()
         return known[factor]
 
-    def _subdomain(self, conduction: sp.csr_matrix, bed: sp.csr_matrix) -> Subdomain:
-        mesh, field = self.part.mesh, self.part.field
+    def _subdomain(self, conduction: sp.csr_matrix, bed: sp.csr_matrix) -> tuple[Subdomain, np.ndarray]:
+        mesh, field, typical = self.part.mesh, self.part.field, self._typical
         whole = mesh.following.stiffness((conduction + bed).tocsr())
         ones = np.ones((mesh.size, 1))
         resistance = float(bed.sum()) / mesh.size
         held = resistance > 0.0
+        stiffened = np.ones(mesh.size)
+        np.divide(whole.diagonal(), typical, out=stiffened, where=typical > 0.0)
         return Subdomain(
             mesh, composition(field, mesh.cells), (), (), self.part.points, np.zeros(mesh.size),
-            ones[:, :0] if held else ones, float(conduction.diagonal().mean()), CachedMatrix(lambda: whole),
+            ones[:, :0] if held else ones, float(typical.mean()), CachedMatrix(lambda: whole),
             ones / np.sqrt(mesh.size) if held else ones[:, :0],
             np.array([resistance]) if held else np.zeros(0), (), BY_MATRIX,
-        )  # fmt: skip
+        ), stiffened  # fmt: skip

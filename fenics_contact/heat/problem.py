@@ -85,6 +85,7 @@ class HeatProblem:
         self._decomposition: Decomposition | None = None
         self._assemblies: tuple[Assembly, ...] = ()
         self._joints: Joints | None = None
+        self._stiffness = np.zeros(0)
 
     @property
     def decomposition(self) -> Decomposition:
@@ -94,12 +95,23 @@ class HeatProblem:
             with self.timer.phase("decompose"):
                 cut = self._partitions or once_a_machine(self.comm, lambda: field.partition(ranks))
                 self._decomposition = decompose(field, cut, self.comm)
+                self._stiffness = self._decomposition.tearing.copy_stiffness
                 forms = HeatForms(self._decomposition.forms.templates)
                 self._assemblies = tuple(
                     Assembly(Part(mesh, self.scene.bodies[mesh.body], field.bodies[mesh.body], forms))
                     for mesh in self._decomposition.meshes
                 )
         return self._decomposition
+
+    def weighted(self, decomposition: Decomposition, heated: tuple[Heated, ...]) -> Decomposition:
+        """Return subdomains whose copies of nodes share jumps by all that resists there. Collective."""
+        here, block = decomposition.held
+        stiffness = np.empty(len(block))
+        stiffness[block] = self._stiffness[here]
+        stiffness *= np.concatenate([np.zeros(0), *(each.stiffened for each in heated)])
+        weighted = decomposition.weighted(self.scene.field, stiffness)
+        self._decomposition = weighted
+        return weighted
 
     @property
     def no_rate(self) -> Rate:
@@ -201,7 +213,8 @@ class _Iteration:
                 require_temperatures(self.scene, self.joints, conductance)
         with timer.phase("assemble"), together(decomposition.comm):
             heated = tuple(self._heated(guess, friction))
-        torn = self._torn(heated, self.joints.rows(conductance), last)
+        decomposition = problem.weighted(decomposition, heated)
+        torn = self._torn(decomposition, heated, self.joints.rows(conductance), last)
         system = DualSystem(torn, timer, previous=None if last is None else last.system)
         with timer.phase("solve"):
             start = None
@@ -223,13 +236,13 @@ class _Iteration:
 
     def _torn(
         self,
+        decomposition: Decomposition,
         heated: tuple[Heated, ...],
         joints: tuple[ConductingRows, ConductingRows],
         last: HeatState | None,
     ) -> TornSystem:
         """Return the torn system. Collective."""
-        scene, decomposition = self.scene.field, self.decomposition
-        comm = decomposition.comm
+        scene, comm = self.scene.field, decomposition.comm
         prescribed, _ = once_a_machine(comm, lambda: prescribed_along(scene, decomposition.tearing))
         none = join_points([], scene.dim, decomposition.tearing.n_nodes)
         normal = NormalRows.of(scene, none, decomposition.axes)

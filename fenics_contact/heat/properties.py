@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -239,6 +239,9 @@ class Conductor:
         >>> board = Conductor((0.8, 0.8, 0.3))
         >>> hot = Conductor(TemperatureTable((20.0, 800.0), (54.0, 27.3)))
     """
+
+    #: Degrees at which conductivities of bodies are compared, to weigh their shares in preconditioners.
+    compared_at: ClassVar[float] = 20.0
 
     conductivity: GivenProperty | Sequence[GivenProperty] | np.ndarray
     heat_capacity: GivenProperty | None = None

@@ -383,7 +383,7 @@ class HeatScene:
 
 def _typical(body: ConductingBody) -> Any:
     """Return stand-ins for the materials of a body."""
-    values = [_Typical(each.typical(20.0) * body.thickness) for each in body.materials]
+    values = [_Typical(each.typical(Conductor.compared_at) * body.thickness) for each in body.materials]
     if isinstance(body.material, Mapping):
         return dict(zip(body.mesh.regions, values, strict=True))
     return values[0]
