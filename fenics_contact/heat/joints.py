@@ -57,7 +57,8 @@ class Joints:
         fixed = np.zeros((tearing.n_nodes, scene.geometry.dim), dtype=bool)
         search = _Unheld(tearing, fixed, comm)
         points, tied = contact_and_tied_points(scene.geometry, search, overlap=True)  # type: ignore[arg-type]
-        return once_a_machine(comm, lambda: _described(scene, points, tied))
+        described = once_a_machine(comm, lambda: _described(scene, points))
+        return cls(scene, points, tied, *described)
 
     def touch(self, temperature: np.ndarray, pressure: np.ndarray, gap: np.ndarray) -> Touch:
         """Return what conductances depend on at temperatures of all nodes, (n_nodes,)."""
@@ -109,7 +110,8 @@ class Joints:
         return ConductingRows.at(self.tied, perfect, perfect), passing
 
 
-def _described(scene: HeatScene, points: ContactPoints, tied: ContactPoints) -> Joints:
+def _described(scene: HeatScene, points: ContactPoints) -> tuple[np.ndarray, ...]:
+    """Return what a scene says of points, in the order of `Joints`."""
     count = points.count
     opposite, pressure, spread, ratio = np.zeros(count), np.zeros(count), np.ones(count), np.ones(count)
     on_obstacle, area = np.zeros(count, dtype=bool), points.area.copy()
@@ -126,4 +128,4 @@ def _described(scene: HeatScene, points: ContactPoints, tied: ContactPoints) -> 
             on_obstacle[mine], given = True, contact.temperature
             name = f"the temperature of the obstacle of {contact.place}"
             opposite[mine] = evaluate(name, given, places[mine], ()) if callable(given) else given
-    return Joints(scene, points, tied, area, opposite, on_obstacle, pressure, spread, ratio)
+    return area, opposite, on_obstacle, pressure, spread, ratio
