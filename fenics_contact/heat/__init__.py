@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         PressureConductance,
         harmonic_mean,
     )
+    from fenics_contact.heat.coupled import HeatedState, solve_heated
     from fenics_contact.heat.friction import FrictionHeat, effusivity_share
     from fenics_contact.heat.parts import (
         Convection,
@@ -48,6 +49,7 @@ __all__ = [
     "HeatSource",
     "HeatState",
     "HeatThroughContact",
+    "HeatedState",
     "HeldTemperature",
     "PressureConductance",
     "Radiation",
@@ -56,6 +58,7 @@ __all__ = [
     "effusivity_share",
     "harmonic_mean",
     "solve_heat",
+    "solve_heated",
 ]
 
 __getattr__, __dir__ = late_names(__name__)

@@ -310,6 +310,29 @@ class HeatScene:
                 )
         _ = self.geometry, self.field
 
+    @classmethod
+    def on(cls, scene: Scene, materials: Mapping[str, Any], **parts: Any) -> Self:
+        """Return heat on the meshes of a scene of mechanics, with their thickness and axes of revolution.
+
+        `materials`: those of the bodies that conduct, by name; `parts`: as for `HeatScene`, ties by default
+        those of the scene. Raises `InvalidInputError` if a body is not there, or has several thicknesses.
+
+        Example:
+            >>> heat = HeatScene.on(scene, {"rod": Conductor(0.05)}, held=[hot])  # doctest: +SKIP
+        """
+        bodies = {}
+        for name, material in materials.items():
+            check_known(name, scene.bodies, f"heat is of body {name!r}, the scene has")
+            body, known = scene.bodies[name], np.unique(scene.bodies[name].thickness_of_cells)
+            if len(known) > 1 or scene.preloads:
+                raise InvalidInputError(
+                    f"heat on meshes of a scene needs bodies of one thickness without cuts of preloads, got "
+                    f"{len(known)} and {len(scene.preloads)}: give HeatScene bodies of your own"
+                )
+            bodies[name] = ConductingBody(body.mesh, material, body.axisymmetric, float(known[0]))
+        ties = [tie for tie in scene.ties if all(side.body in bodies for side in tie.surfaces)]
+        return cls(bodies, **{"ties": ties, **parts})
+
     def _facts(self) -> dict[str, Any]:
         return {
             "bodies": {name: body.mesh.cells_in_words for name, body in self.bodies.items()},

@@ -1,0 +1,350 @@
+"""Heat and mechanics of the same bodies: temperatures strain, pressures and gaps conduct, friction heats.
+
+Mechanics at temperatures T leads to temperatures G(T), and the answer is a fixed point of G. Where touching
+warms bodies, which then press harder, G rises: there may be several fixed points, and repeating G leads to
+stable ones. Where it cools them, G falls: repeating it alternates, combining passes finds the fixed point,
+and there is none where conductance jumps as contact opens (J. R. Barber, J. Elasticity 8 (1978) 409-423; J.
+R. Barber, J. Dundurs, M. Comninou, J. Appl. Mech. 47 (1980) 871-874).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
+from fenics_contact._equilibrium.previous import ONLY_STEP
+from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._scene.checks import check_known
+from fenics_contact._scene.effects import EffectName
+from fenics_contact._scene.fields import NodeValues
+from fenics_contact._scene.loads import ThermalStrain
+from fenics_contact._scene.pairs import ContactPair
+from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively, together
+from fenics_contact.errors.kinds import safe_log
+from fenics_contact.heat.acceleration import Anderson
+from fenics_contact.heat.assembly import Rate
+from fenics_contact.heat.friction import FrictionHeat
+from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.problem import GivenContact, HeatProblem, as_given
+from fenics_contact.heat.scene import HeatScene
+from fenics_contact.heat.state import HeatState
+from fenics_contact.materials.elastic import can_expand
+from fenics_contact.results.deformed_state import AnyState
+
+_LOG = logging.getLogger(__name__)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class HeatedState:
+    """Mechanics and temperatures that agree.
+
+    Attributes:
+        mechanics: The state of the bodies, with `ThermalStrain` of the temperatures.
+        heat: The temperatures, with the pressures and gaps of the bodies.
+        passes: How often both were solved in turn; one where one of them does not depend on the other.
+        start: Which temperatures the first pass had, in words: of several possible states they choose one.
+        gain: Part of a small change of temperatures that a pass returns, estimated from the last two.
+        problems: Those that computed it, used again in the next step.
+    """
+
+    mechanics: AnyState
+    heat: HeatState
+    passes: int
+    start: str
+    gain: float
+    problems: tuple[ContactProblem, HeatProblem] = field(repr=False)
+
+
+@dataclass(eq=False)
+class _Passes:
+    """Passes of one step: mechanics at temperatures, then temperatures at its contacts.
+
+    `cold`: temperatures at which bodies are free of stress, by body; `before`: mechanics before the step.
+    """
+
+    scene: Scene
+    heat: HeatScene
+    problems: tuple[ContactProblem, HeatProblem]
+    joints: Joints
+    cold: Mapping[str, float]
+    before: AnyState | None
+    duration: float
+    rate: Rate
+    settled: float
+    start: str
+    known: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    gain: float = 0.0
+    answers: list[HeatedState] = field(default_factory=list)
+
+    def run(self, guess: np.ndarray, most: int = 80) -> HeatedState:
+        """Return the state in which both agree. Collective."""
+        if not self._mechanics_heats:
+            heat = self._heat(as_given(self.joints))
+            return self._answer(self._mechanics(heat.values), heat)
+        if not (self._expanding or self._rubbing):
+            state = self._mechanics(guess)
+            return self._answer(state, self._heat(self._given(state)))
+        anderson = Anderson()
+        while not self.answers and len(self.known) < most:
+            change = self._pass(guess)
+            if self.gain > 1.0:  # follow what grows to where it grows no more
+                anderson, guess = Anderson(), guess + change
+            else:
+                guess = anderson.next(guess, guess + change)
+            large = np.linalg.norm(change) > 1e-3 * np.linalg.norm(self.known[0][1])
+            if large and len(self.known) % 10 == 0 and any(change @ r < 0.0 for _, r in self.known[-6:]):
+                anderson, guess = Anderson(), self._between()
+        if self.answers:
+            return self.answers[0]
+        raise ConvergenceError(
+            f"temperatures and contact do not settle: after {most} passes temperatures still change by "
+            f"{np.abs(change).max():.2g}; start from a state nearby by start=..., or heat in steps"
+        )
+
+    def _answer(self, state: AnyState, heat: HeatState) -> HeatedState:
+        return HeatedState(state, heat, max(len(self.known), 1), self.start, self.gain, self.problems)
+
+    @cached_property
+    def _pairs(self) -> dict[int, int]:
+        """Number of a thermal contact -> that of the contact pair with its surfaces, where there is one."""
+        pairs = [[pair.slave, pair.master] for pair in self.scene.contacts]
+        sides = [[contact.slave, contact.master] for contact in self.heat.contacts]
+        found = {k: [both in (each, each[::-1]) for each in pairs] for k, both in enumerate(sides)}
+        return {number: same.index(True) for number, same in found.items() if True in same}
+
+    @property
+    def _mechanics_heats(self) -> bool:
+        """Whether temperatures depend on mechanics."""
+        heats = any(law.part > 0.0 for law in self._laws.values())
+        return heats or any(each.law.by_contact for each in self.heat.contacts)
+
+    @property
+    def _laws(self) -> dict[int, FrictionHeat]:
+        """The heat of friction of each thermal contact that has a contact pair, by its number."""
+        return {number: self.heat.contacts[number].friction for number in self._pairs}
+
+    @property
+    def _expanding(self) -> list[str]:
+        """The bodies that temperatures strain."""
+        materials = {name: self.scene.bodies[name].materials for name in self.heat.bodies}
+        return [name for name, given in materials.items() if any(map(can_expand, given))]
+
+    @property
+    def _rubbing(self) -> list[int]:
+        """The thermal contacts whose temperatures change the friction of their pair."""
+        acting = {
+            number: self.scene.contacts[place].effects(self.scene) for number, place in self._pairs.items()
+        }
+        return [k for k, law in self._laws.items() if law.by_temperature and EffectName.COULOMB in acting[k]]
+
+    def _pass(self, guess: np.ndarray) -> np.ndarray:
+        """Return by how much temperatures change in a pass; it is an answer if that is little. Collective."""
+        state = self._mechanics(guess)
+        heat = self._heat(self._given(state))
+        change = heat.values - guess
+        if self.known:
+            way, turn = guess - self.known[-1][0], change - self.known[-1][1]
+            self.gain = 1.0 + float(way @ turn) / (float(way @ way) or 1.0)
+        self.known.append((guess, change))
+        size, first = (np.ptp([*x, *(x + r)]) for x, r in (self.known[-1], self.known[0]))
+        words = "pass %d from %s: temperatures change by %.1e of %.2g, gain %.2g"
+        largest = np.abs(change).max()
+        safe_log(_LOG.info, words, len(self.known), self.start, largest, size, self.gain)
+        if largest <= self.settled * size:
+            self.answers.append(self._answer(state, heat))
+        elif size > 1e6 * first:
+            raise ConvergenceError(
+                "heat and pressure raise each other without end, there is no steady state: bodies slide "
+                "faster, or are held more stiffly, than heat leaves them (thermoelastic instability); cool "
+                "more, slide slower, or follow the course in time by before=... and duration=..."
+            )
+        return change
+
+    def _between(self, halvings: int = 16) -> np.ndarray:
+        """Return temperatures between two passes with opposite changes, where these are small. Collective.
+
+        Raises where changes stay large however close the temperatures are: there the conductance jumps.
+        """
+        low, down = self.known[-1]
+        high, up = next((x, r) for x, r in reversed(self.known) if r @ down < 0.0)
+        first = min(np.linalg.norm(down), np.linalg.norm(up))
+        for _ in range(halvings):
+            guess = 0.5 * (low + high)
+            change = self._pass(guess)
+            if self.answers or np.linalg.norm(change) < 0.05 * first:
+                return guess
+            if change @ down > 0.0:
+                low, down = guess, change
+            else:
+                high, up = guess, change
+        found = (self.joints.sides(x + r)[0].max() for x, r in ((low, down), (high, up)))
+        raise ConvergenceError(
+            "there is no steady state: bodies that touch cool until they part, and warm until they touch "
+            "(Barber's thermoelastic contact), surfaces are at {:.6g} or {:.6g} in turn as the conductance "
+            "jumps where contact opens: give one that is continuous, such as a PressureConductance plus a "
+            "GapConductance".format(*found)
+        )
+
+    def _mechanics(self, temperature: np.ndarray) -> AnyState:
+        """Return the state at temperatures of all nodes. Collective."""
+        scene, (mechanics, temperatures) = self.scene, self.problems
+        tearing, loads = temperatures.decomposition.tearing, [*scene.loads]
+        for name in self._expanding:
+            points = scene.bodies[name].mesh.points
+            own = temperature[tearing.first_of(name) :][: len(points)]
+            loads.append(ThermalStrain(name, NodeValues(points, own - self.cold[name])))
+        heated = replace(scene, loads=loads)
+        if self._rubbing:
+            heated = replace(heated, contacts=self._with_friction(temperature))
+        step, before = ONLY_STEP, self.before
+        if self.duration < np.inf:
+            step = LoadStep("heated", time=self.duration + (0.0 if before is None else before.time))
+        return mechanics.solve(heated, before=before, step=step)
+
+    def _with_friction(self, temperature: np.ndarray) -> list[ContactPair]:
+        """Return the contact pairs with the friction of the temperatures between their surfaces."""
+        pairs, joints = list(self.scene.contacts), self.joints
+        mean = 0.5 * np.sum(joints.sides(temperature), axis=0)
+        for number in self._rubbing:
+            mine, place = np.flatnonzero(joints.points.pair == number), self._pairs[number]
+            table: Any = self._laws[number].coefficient
+            law: Any = pairs[place].friction
+            values = NodeValues(joints.places[mine], table.at(mean[mine]))
+            pairs[place] = replace(pairs[place], friction=replace(law, friction_coefficient=values))
+        return pairs
+
+    def _given(self, state: AnyState) -> GivenContact:
+        """Return the pressures, gaps and work of a state at the points where heat passes. Collective."""
+        points, given, contact = self.joints.points, as_given(self.joints), state.contact
+        names = self.problems[1].decomposition.tearing.body_names
+        moved = np.concatenate([state.gather_displacement(name) for name in names])
+        way = points.relative(moved[:, : points.normal.shape[1]])
+        pressure, gap = given.pressure.copy(), points.gap + np.einsum("nd,nd->n", points.normal, way)
+        work = given.work.copy()
+        lost = np.maximum(np.einsum("na,na->n", contact.friction_force, contact.slip), 0.0) / self.duration
+        table = np.column_stack(
+            [np.ones(len(lost)), contact.nominal_pressure, contact.gap, lost / contact.nominal_area]
+        )
+        for number, place in self._pairs.items():
+            mine = np.flatnonzero(points.pair == number)
+            known, p, g, w = self._at_points(state, number, table)[mine].T
+            pressure[mine], gap[mine] = np.maximum(p, 0.0), np.where(known, g, gap[mine])
+            # Means over other nodes keep the work of the whole pair.
+            w, total = np.maximum(w, 0.0), lost[contact.on_pair(place)].sum()
+            work[mine] = w * (total / (w @ self.joints.area[mine])) if w.any() else w
+        return GivenContact(pressure, gap, work)
+
+    def _at_points(self, state: AnyState, number: int, table: np.ndarray) -> np.ndarray:
+        """Return rows of the points of a contact pair at those of its thermal contact, zero elsewhere."""
+        contact, points, place = state.contact, self.joints.points, self._pairs[number]
+        side = self.scene.contacts[place].slave
+        weights = points.own if side == self.heat.contacts[number].slave else points.master
+        tearings = self.problems[1].decomposition.tearing, state.torn.decomposition.tearing
+        here, there = (tearing.first_of(side.body) for tearing in tearings)
+        nodes, which = contact.points.of_surface(place, np.arange(contact.points.count))
+        fields = np.zeros((weights.shape[1], table.shape[1]))
+        fields[nodes - there + here] = table[which]
+        found = np.asarray(weights @ fields)
+        covered = found[:, :1]
+        return np.where(covered > 0.5, found, 0.0) / np.where(covered > 0.5, covered, 1.0)
+
+    def _heat(self, given: GivenContact) -> HeatState:
+        return self.problems[1].solve(self.heat, rate=self.rate, given=given)
+
+
+def _checked(scene: Scene, heat: HeatScene, given: Mapping[str, float]) -> None:
+    """Reject fields on different bodies or meshes, and materials that are free of stress elsewhere."""
+    for name, body in heat.bodies.items():
+        check_known(name, scene.bodies, f"heat is of body {name!r}, the mechanics has")
+        check_known(name, given, f"stress_free needs a temperature of body {name!r}, it has")
+        points, known = body.mesh.points, scene.bodies[name].mesh.points
+        if not np.array_equal(known, points):
+            raise InvalidInputError(
+                f"heat and mechanics need the same mesh of body {name!r}, got {len(points)} nodes for heat, "
+                f"{len(known)} for mechanics: take HeatScene.on(scene, ...)"
+            )
+        materials = scene.bodies[name].materials
+        initial = {getattr(each, "initial_temperature", given[name]) for each in materials}
+        if initial != {given[name]}:
+            raise InvalidInputError(
+                f"body {name!r} must be free of stress at the initial temperature of its materials, "
+                f"{sorted(initial)}, got stress_free {given[name]:g}: give it by stress_free={{...}}"
+            )
+
+
+@collectively("solve_heated", lambda scene, heat, comm, **_: comm)
+def solve_heated(
+    scene: Scene,
+    heat: HeatScene,
+    comm: MPI.Comm,
+    *,
+    stress_free: float | Mapping[str, float] = 0.0,
+    start: Mapping[str, float | np.ndarray] | None = None,
+    before: HeatedState | None = None,
+    duration: float = np.inf,
+    partitions: Mapping[str, np.ndarray] | None = None,
+    tolerance: float = 1e-9,
+    settled: float = 1e-7,
+) -> HeatedState:
+    """Compute temperatures and deformation that depend on each other. Collective on ``comm``.
+
+    Temperatures strain bodies that expand, and change `TemperatureDependentElasticity`. A `ThermalContact`
+    has the pressures, forces by undeformed area, and gaps of the contact pair with its surfaces, whichever is
+    the slave; without such a pair the gap that displacements leave. A `TemperatureTable` of its
+    `FrictionHeat` is also the friction coefficient of a pair with Coulomb's law. Where one field does not
+    depend on the other, each is solved once.
+
+    Args:
+        scene: Mechanics of the bodies.
+        heat: Heat of these bodies on the same meshes, see `HeatScene.on`; others have no thermal strain.
+        comm: Communicator over which the subdomains are spread.
+        stress_free: Temperature at which bodies are free of thermal strain, one for all or by body.
+        start: Temperatures to begin with, by body; by default those before, or free of stress. Of several
+            steady states one that they lead to is found.
+        before: State at the end of the step before, with the same bodies.
+        duration: Time of the step, in which bodies store heat since ``before``, by Euler's rule of the first
+            order, and friction forces times slips become heat; by default so long that a steady state is
+            reached, in which prescribed speeds alone heat.
+        partitions: As for `solve_scene`.
+        tolerance: Largest relative residual of mechanics.
+        settled: Largest change of temperatures in the last pass, relative to their range.
+
+    Raises:
+        InvalidInputError: If both scenes do not fit each other.
+        InfeasibleError: If nothing holds a body, or the temperature of a heated one.
+        ConvergenceError: If there is no steady state, or none is found.
+
+    Example:
+        >>> heat = HeatScene.on(scene, {"rod": steel}, held=[hot], contacts=[joint])  # doctest: +SKIP
+        >>> state = solve_heated(scene, heat, MPI.COMM_WORLD, stress_free=20.0)  # doctest: +SKIP
+        >>> later = solve_heated(pressed, heat, MPI.COMM_WORLD, before=state, duration=5.0)  # doctest: +SKIP
+    """
+    cold: Any = stress_free if isinstance(stress_free, Mapping) else dict.fromkeys(heat.bodies, stress_free)
+    given, old, words = start or {}, cold, "temperatures free of stress"
+    with together(comm):
+        _checked(scene, heat, cold)
+        for name in given:
+            check_known(name, heat.bodies, f"start has temperatures of body {name!r}, the heat has")
+    if before is not None:
+        problems, mechanics = before.problems, before.mechanics
+        old, words = before.heat.temperature, "those before the step"
+        rate = Rate(1.0 / duration, before.heat.values, problems[1].no_rate.history)
+    else:
+        problems = (
+            ContactProblem(scene, comm, partitions=partitions, tolerance=tolerance),
+            HeatProblem(heat, comm, partitions=partitions),
+        )
+        rate, mechanics = problems[1].no_rate, None
+    first = [np.zeros(body.mesh.n_nodes) + {**old, **given}[name] for name, body in heat.bodies.items()]
+    joints, words = problems[1].joints(heat), "the given temperatures" if start else words
+    passes = _Passes(scene, heat, problems, joints, cold, mechanics, duration, rate, settled, words)
+    return passes.run(np.concatenate(first))
