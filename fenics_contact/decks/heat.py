@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,19 +12,18 @@ import numpy as np
 
 from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact._base.display import displayed
-from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.pairs import Surface, Tie
 from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.cards import DeckCards, Record
 from fenics_contact.decks.deck import Deck, deck_with
 from fenics_contact.decks.heat_materials import conductance_of, conductor_of, read_conductances
-from fenics_contact.decks.heat_steps import AtNodes, HeatCards, heat_steps
+from fenics_contact.decks.heat_steps import NODES, VOLUMES, Acting, HeatCards, heat_steps
 from fenics_contact.decks.names import names_of
 from fenics_contact.decks.pairs import pairs_of
 from fenics_contact.decks.steps import groups_of, read_steps
 from fenics_contact.decks.vocabulary import HEAT_CARDS, HEAT_MODEL, KNOWN, PRINT_CARDS, refuse_unknown
 from fenics_contact.errors.ranks import on_root_then_bcast
-from fenics_contact.heat.parts import HeatAtNodes, HeldTemperature
+from fenics_contact.heat.parts import HeldTemperature
 from fenics_contact.heat.problem import solve_heat
 from fenics_contact.heat.properties import Conductor
 from fenics_contact.heat.scene import ConductingBody, HeatScene, ThermalContact
@@ -39,29 +38,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """What makes a part of a scene: where, and of which values, the first of which follow an amplitude."""
+    """What makes a part of a scene: where it is, and the first of its values follows an amplitude."""
 
-    make: Callable[..., Any]
+    of: Acting
     body: str
     name: str
-    values: tuple[Any, ...]
-    by: int
 
     def at(self, factors: np.ndarray) -> Any:
         """Return the part with factors of amplitudes by their numbers."""
-        first, *rest = self.values
-        factor = float(factors[self.by])
-        first = NodeValues(first.points, factor * first.values) if callable(first) else factor * first
-        return self.make(self.body, self.name, first, *rest)
-
-
-@dataclass(frozen=True, eq=False)
-class HeatStep:
-    """A step of heat; `held` and `loads`: what makes the parts of its scenes."""
-
-    cards: HeatCards
-    held: Sequence[Placed]
-    loads: Sequence[Placed]
+        first, *rest = self.of.values
+        return self.of.make(self.body, self.name, float(first * factors[self.of.by]), *rest)
 
 
 @displayed
@@ -75,7 +61,7 @@ class HeatDeck:
         contacts: Its contact pairs with a conductance.
         ties: Its ties, whose temperatures are equal.
         initial: Initial temperatures of the nodes of each body.
-        steps: Its steps.
+        steps: Its steps, with what makes the parts of their scenes.
     """
 
     frame: Deck
@@ -83,18 +69,23 @@ class HeatDeck:
     contacts: Sequence[ThermalContact]
     ties: Sequence[Tie]
     initial: Mapping[str, np.ndarray]
-    steps: Sequence[HeatStep]
+    steps: Sequence[tuple[HeatCards, Sequence[Placed]]]
 
     def scene(self, step: int = 0, time: float | None = None) -> HeatScene:
         """Return the scene of a step, numbered from 0, at a time since it began, by default at its end."""
-        of = self.steps[step]
-        factors = of.cards.factors(of.cards.period if time is None else time)
-        held, loads = ([each.at(factors) for each in parts] for parts in (of.held, of.loads))
+        cards, placed = self.steps[step]
+        factors = cards.factors(cards.period if time is None else time)
+        held = [each.at(factors) for each in placed if each.of.make is HeldTemperature]
+        loads = [each.at(factors) for each in placed if each.of.make is not HeldTemperature]
         return HeatScene(self.bodies, held, loads, self.contacts, self.ties)
 
     def solve(self, comm: MPI.Comm, **settings: Any) -> list[HeatState]:
         """Compute the state at the end of each step. Collective; settings are those of `solve_heat`."""
-        return [solve_heat(self.scene(k), comm, **settings) for k in range(len(self.steps))]
+        return list(self.states(comm, **settings))
+
+    def states(self, comm: MPI.Comm, **settings: Any) -> Iterator[HeatState]:
+        """Yield the state at the end of each step as soon as it is known. Collective."""
+        yield from (solve_heat(self.scene(k), comm, **settings) for k in range(len(self.steps)))
 
 
 @naming_arguments
@@ -139,8 +130,8 @@ def _read(path: Path) -> HeatDeck:
         if card.name == "EQUATION" and any(len(row) > 1 and row[1] == "11" for row in card.rows):
             raise card.error("equations of temperatures are not solved: join bodies by *TIE")
     steps = heat_steps(cards, deck.mesh)
-    heated = [each.faces for step in steps for each in step.acting if not each.on_faces]
-    sets = [(f"DFLUX {k}", faces.elements) for k, faces in enumerate(heated, start=1)]
+    heated = [each.at.elements for step in steps for each in step.acting if each.at.sides[0] == VOLUMES]
+    sets = [(f"DFLUX {k}", elements) for k, elements in enumerate(heated, start=1)]
     mesh, sections, of_element, parts = split_sections(
         deck.mesh, deck.sections, deck.of_element, deck.components, sets
     )
@@ -169,23 +160,22 @@ class _Builder:
         self.deck, self.cards, self.steps = deck, cards, steps
         names, self.known = names_of(deck, read_steps(deck.cards, deck.mesh)), dict[bytes, str]()
         surfaces, node_sets = dict(names.surfaces), dict(names.node_sets)
-        for step in steps:
-            for nodes, _, _ in (*step.held.groups(), *step.flux.groups()):
-                node_sets[self._name("NODES", nodes)] = nodes
-            for each in step.acting:
-                if each.on_faces:
-                    deck.exterior.require(each.faces, each.card, each.row, "heat must enter", "correct it")
-                    surfaces[self._name("FACES", *vars(each.faces).values())] = each.faces
+        for each in (each for step in steps for each in step.acting):
+            if each.at.sides[0] == NODES:
+                node_sets[self._name(each)] = each.at.elements
+            elif each.at.sides[0] != VOLUMES:
+                deck.exterior.require(each.at, each.card, each.row, "heat must enter", "correct it")
+                surfaces[self._name(each)] = each.at
         self.parts = build_bodies(
             deck.mesh, deck.components, deck.of_element, deck.sections, surfaces, node_sets,
             f"deck '{deck.name}'",
         )  # fmt: skip
         self.built = DeckBodies(deck, read_steps(deck.cards, deck.mesh), names, self.parts, {})
 
-    def _name(self, kind: str, *place: np.ndarray) -> str:
+    def _name(self, of: Acting) -> str:
         """Return the name of nodes or faces, always the same one."""
-        key = b"".join([kind.encode(), *(each.tobytes() for each in place)])
-        return self.known.setdefault(key, f"{kind} {len(self.known) + 1}")
+        key = of.at.elements.tobytes() + of.at.sides.tobytes()
+        return self.known.setdefault(key, f"{of.card.written} {len(self.known) + 1}")
 
     def made(self) -> HeatDeck:
         """Return the deck."""
@@ -195,14 +185,7 @@ class _Builder:
             raise DeckError(words, deck.name)
         bodies = {part.name: self._body(part) for part in deck.components}
         contacts, ties = self._contacts()
-        steps = [
-            HeatStep(
-                step,
-                [*self._at_nodes(step.held, HeldTemperature)],
-                [*self._at_nodes(step.flux, HeatAtNodes), *self._acting(step)],
-            )
-            for step in self.steps
-        ]
+        steps = [(step, [*self._placed(step.acting)]) for step in self.steps]
         every = self.built.steps.initial
         initial = {name: every[self.parts.nodes[name][: mesh.n_nodes]] for name, mesh in meshes.items()}
         scene = HeatScene(bodies, contacts=contacts, ties=ties).geometry
@@ -241,28 +224,20 @@ class _Builder:
         material: Any = given if len(given) > 1 else next(iter(given.values()))
         return ConductingBody(self.parts.meshes[part.name], material, deck.kind == "axisymmetric", *thick)
 
-    def _at_nodes(self, given: AtNodes, make: Callable[..., Any]) -> Iterator[Placed]:
-        """Yield what is given to nodes, body by body."""
-        for nodes, values, by in given.groups():
-            for body, mesh in self.parts.meshes.items():
-                mine, places = self.parts.within(body, nodes)
-                own = values[np.isin(nodes, mine)]
-                if len(own):
-                    value = NodeValues(mesh.points[places], own) if np.ptp(own) else float(own[0])
-                    yield Placed(make, body, self._name("NODES", nodes), (value,), by)
-
-    def _acting(self, step: HeatCards) -> Iterator[Placed]:
-        """Yield what is given to faces and volumes, body by body."""
+    def _placed(self, acting: Sequence[Acting]) -> Iterator[Placed]:
+        """Yield what is given to nodes, faces and volumes, body by body."""
         deck = self.deck
-        for each in step.acting:
-            if each.on_faces:
-                name = self._name("FACES", *vars(each.faces).values())
-                places = [(body, name) for body, mesh in self.parts.meshes.items() if name in mesh.surfaces]
+        for each in acting:
+            if each.at.sides[0] != VOLUMES:
+                name = self._name(each)
+                found = [Placed(each, body, name) for body in self.built.bodies_with(name)]
             else:
-                places = [
-                    (part.name, region if len(part.sections) > 1 else "")
+                found = [
+                    Placed(each, part.name, region if len(part.sections) > 1 else "")
                     for part in deck.components
                     for region, number in zip(regions_of(deck.sections, part), part.sections, strict=True)
-                    if np.isin(np.flatnonzero(deck.of_element == number), each.faces.elements).all()
+                    if np.isin(np.flatnonzero(deck.of_element == number), each.at.elements).all()
                 ]
-            yield from (Placed(each.make, *place, each.values, each.by) for place in places)
+            if not found:
+                deck.note(each.card, f"nodes of line {each.card.numbers[each.row]} belong to no element")
+            yield from found

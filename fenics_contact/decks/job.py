@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +12,12 @@ from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.files import hidden_folder
 from fenics_contact._equilibrium.steps import LoadSequence
 from fenics_contact.decks.deck import Deck, read_deck
+from fenics_contact.decks.heat import HeatDeck, conducts, read_heat_deck
+from fenics_contact.decks.heat_results import HeatResults
 from fenics_contact.decks.results import DeckResults, exponential
 from fenics_contact.errors import together
+from fenics_contact.errors.ranks import on_root_then_bcast
+from fenics_contact.heat.state import HeatState
 from fenics_contact.output.files import OutputError, write_text
 from fenics_contact.output.frd import add_on_first, writing
 from fenics_contact.results.state import State
@@ -108,11 +112,17 @@ def run_job(
     with together(comm):
         if comm.rank == 0:
             _clear(given, list(files.values()))
-    deck = read_deck(given, comm)
-    results = DeckResults(deck)
-    for words in (*deck.notes, *results.notes):
+    results: DeckResults
+    increments: Iterator[tuple[Any, Increment]]
+    if on_root_then_bcast(comm, lambda: conducts(given)):
+        heat = read_heat_deck(given, comm)
+        results, increments = HeatResults(heat.frame), _of_heat(heat, comm, settings)
+    else:
+        deck = read_deck(given, comm)
+        results, increments = DeckResults(deck), _of_statics(deck, comm, settings)
+    for words in (*results.deck.notes, *results.notes):
         note(words)
-    _solve(deck, results, comm, files, watch, settings)
+    _solve(increments, results, comm, files, watch)
     return list(files.values())
 
 
@@ -131,33 +141,52 @@ def _clear(deck: Path, files: list[Path]) -> None:
         ) from error
 
 
+def _of_statics(deck: Deck, comm: MPI.Comm, settings: dict[str, Any]) -> Iterator[tuple[State, Increment]]:
+    """Yield the states of all increments as they are solved. Collective."""
+    sequence, solved = LoadSequence(deck.problem(comm, **settings), count=len(deck.steps)), list[Increment]()
+    for step, load in zip(deck.step_of, deck.steps, strict=True):
+        state = sequence.advance(load)
+        solved.append(_increment(deck, state, step, solved))
+        yield state, solved[-1]
+    sequence.finish()
+
+
+def _of_heat(
+    deck: HeatDeck, comm: MPI.Comm, settings: dict[str, Any]
+) -> Iterator[tuple[HeatState, Increment]]:
+    """Yield temperatures at the ends of all steps as they are solved. Collective."""
+    for number, ((step, _), state) in enumerate(zip(deck.steps, deck.states(comm, **settings), strict=True)):
+        length, residual = step.period, float(state.solution.natural_residual)
+        end = step.start + length
+        yield state, Increment(number + 1, 1, state.iterations, end, length, length, residual, 0)
+
+
 def _solve(
-    deck: Deck,
+    increments: Iterator[tuple[Any, Increment]],
     results: DeckResults,
     comm: MPI.Comm,
     files: dict[str, Path],
     watch: Callable[[Increment], None],
-    settings: dict[str, Any],
 ) -> None:
     """Solve all increments and write the files. Collective."""
-    printed, solved = list[str](), list[Increment]()
-    sequence = LoadSequence(deck.problem(comm, **settings), count=len(deck.steps))
-    failures = list[Exception]()
-    materials = list(dict.fromkeys(name for kind, name in deck.sources if kind == "material"))
+    printed, solved, failures = list[str](), list[Increment](), list[Exception]()
+    materials = list(dict.fromkeys(name for kind, name in results.deck.sources if kind == "material"))
     with ExitStack() as stack:
         writer = stack.enter_context(writing(comm, files[".frd"], results.written, materials))
-        for step, load in zip(deck.step_of, deck.steps, strict=True):
+        while True:
             try:
-                state = sequence.advance(load)
+                state, last = next(increments)
+            except StopIteration:
+                break
             except Exception as error:
                 if not solved:
                     raise
                 failures.append(error)
                 break
-            solved.append(_increment(deck, state, step, solved))
-            last = solved[-1]
-            printed.append(results.printout(state, step, last.time))
-            add_on_first(comm, writer, results.nodal(state, step), last.time, last.step, last.number)
+            solved.append(last)
+            printed.append(results.printout(state, last.step - 1, last.time))
+            fields = results.nodal(state, last.step - 1)
+            add_on_first(comm, writer, fields, last.time, last.step, last.number)
             _write_lines(comm, files, solved)
             watch(last)
     with together(comm):
@@ -165,7 +194,6 @@ def _solve(
             write_text(files[".dat"], "".join(printed))
     for failure in failures:
         raise failure
-    sequence.finish()
 
 
 def _increment(deck: Deck, state: State, step: int, before: list[Increment]) -> Increment:

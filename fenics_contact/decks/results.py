@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,9 +22,8 @@ from fenics_contact.output.frd import (
 )
 from fenics_contact.readers.deck_elements import Element
 from fenics_contact.readers.deck_mesh import Block
-from fenics_contact.results.at_points import PointFields
+from fenics_contact.results.at_points import AtPoints
 from fenics_contact.results.fields import ContactNodes, in_space
-from fenics_contact.results.state import State
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +47,9 @@ class DeckResults:
         "ELPRINT": ("S", "E", "PEEQ"),
         "CONTACTPRINT": ("CDIS", "CSTR", "CF", "CFN", "CFS"),
     }
+
+    #: What is written where the deck asks for nothing that is known.
+    otherwise: ClassVar[Mapping[str, str]] = {"DISP": "displacements", "STRESS": "stresses"}
 
     @cached_property
     def numbering(self) -> BodyNumbers:
@@ -95,8 +97,8 @@ class DeckResults:
         return [each for each in self.deck.prints if _plain(each) == card and each.step in steps[-1:]]
 
     def fields(self, step: int) -> list[str]:
-        """Return the kinds of fields of a step; displacements and stresses if the deck asks for none here."""
-        return self._asked_fields(step) or ["DISP", "STRESS"]
+        """Return the kinds of fields of a step; usual ones if the deck asks for none here."""
+        return self._asked_fields(step) or [*self.otherwise]
 
     def _asked_fields(self, step: int) -> list[str]:
         """Return the kinds of fields that the deck asks for, CONTACT where there is contact."""
@@ -126,16 +128,20 @@ class DeckResults:
             found.append("OUTPUT=2D: fields of contact are not written for nodes of shells")
         if not all(map(self._asked_fields, self.deck.step_of)):
             nothing = "where the deck asks for no known fields (*NODE FILE, *EL FILE)"
-            found.append(f"{nothing}, displacements and stresses are written")
+            found.append(f"{nothing}, {' and '.join(self.otherwise.values())} are written")
         return found
 
     def shells_among(self, nodes: np.ndarray) -> np.ndarray:
         """Return which of some numbers are those of shells alone, for which others are in the mesh."""
         return np.setdiff1d(nodes[self.deck.are_of_shells(nodes)], self.numbering.mesh.numbers)
 
-    def nodal(self, state: State, step: int) -> list[FrdField]:
+    def made(self, state: Any, kinds: Sequence[str]) -> list[FrdField]:
+        """Return fields of a state on all nodes by their kinds. Collective."""
+        return nodal_fields(state, self.numbering, kinds)
+
+    def nodal(self, state: Any, step: int) -> list[FrdField]:
         """Return the fields of a state in a step, those of sets for their nodes alone. Collective."""
-        found = nodal_fields(state, self.numbering, self.fields(step))
+        found = self.made(state, self.fields(step))
         found = [self._on_shells(each) for each in found] if self.is_flat else found
         chosen = {
             kind: self.deck.across_shells(np.concatenate([self.deck.node_sets[e.where] for e in some]))
@@ -150,9 +156,13 @@ class DeckResults:
         rows = rows[np.isin(rows[:, 0], self.written.numbers)]
         return FrdField(of.kind, rows[:, 0].astype(np.int64), rows[:, 1:])
 
-    def printout(self, state: State, step: int, time: float) -> str:
+    def tables(self, state: Any, time: float) -> Tables:
+        """Return what makes the tables of a state."""
+        return Tables(self, state, time)
+
+    def printout(self, state: Any, step: int, time: float) -> str:
         """Return the tables of the printed file of a state. Collective."""
-        tables = Tables(self, state, time)
+        tables = self.tables(state, time)
         return "".join(
             text
             for card in self.printed
@@ -203,7 +213,7 @@ class Tables:
     """
 
     results: DeckResults
-    state: State
+    state: Any
     time: float
 
     #: Degrees of CalculiX's sector of bodies of revolution.
@@ -221,20 +231,25 @@ class Tables:
         return f"\n {what} and time {exponential(self.time, 7):>14s}\n\n"
 
     def _displacements(self, asked: Print) -> Iterator[str]:
-        numbers, values = self._nodal("DISP", asked)
-        yield self._head(f"displacements (vx,vy,vz) for set {asked.where}") + _rows(numbers, values)
+        yield from self._values("DISP", "displacements (vx,vy,vz)", asked)
+
+    def _values(self, kind: str, what: str, asked: Print) -> Iterator[str]:
+        yield self._head(f"{what} for set {asked.where}") + _rows(*self._nodal(kind, asked))
 
     def _forces(self, asked: Print) -> Iterator[str]:
-        numbers, values = self._nodal("FORC", asked)
-        if self.state.scene.axisymmetric:
+        yield from self._summed("FORC", "forces (fx,fy,fz)", "total force (fx,fy,fz)", asked)
+
+    def _summed(self, kind: str, each: str, total: str, asked: Print) -> Iterator[str]:
+        numbers, values = self._nodal(kind, asked)
+        if self.results.deck.scene.axisymmetric:
             values = values * self.sector / 360.0
         if asked.totals != "ONLY":
-            yield self._head(f"forces (fx,fy,fz) for set {asked.where}") + _rows(numbers, values)
+            yield self._head(f"{each} for set {asked.where}") + _rows(numbers, values)
         if asked.totals:
-            yield self._head(f"total force (fx,fy,fz) for set {asked.where}") + _sums(values.sum(axis=0))
+            yield self._head(f"{total} for set {asked.where}") + _sums(values.sum(axis=0))
 
     def _nodal(self, kind: str, asked: Print) -> tuple[np.ndarray, np.ndarray]:
-        (field,) = nodal_fields(self.state, self.results.numbering, (kind,))
+        (field,) = self.results.made(self.state, (kind,))
         asked_for = self.results.deck.node_sets.get(asked.where, field.numbers)
         mine, shells = np.isin(field.numbers, asked_for), self.results.shells_among(asked_for)
         numbers, values = field.numbers[mine], field.values[mine]
@@ -257,11 +272,14 @@ class Tables:
         head = f"equivalent plastic strain (elem, integ.pnt.,pe)for set {asked.where}"
         yield self._head(head) + self._at_points(asked, "plastic_strain")
 
+    def _points(self, body: str) -> AtPoints:
+        return self.state.gather_at_points(body)  # type: ignore[no-any-return]
+
     def _at_points(self, asked: Print, what: str) -> str:
         deck, found = self.results.deck, list[np.ndarray]()
         mesh = deck.mesh.mesh
         for body, numbers in deck.element_numbers.items():
-            at = self.state.gather_at_points(body)
+            at = self._points(body)
             for block in filter(has_type, mesh.blocks):
                 mine = np.isin(numbers, block.numbers) & np.isin(numbers, deck.element_sets[asked.where])
                 if mine.any():
@@ -326,13 +344,13 @@ def _sums(values: Sequence[float] | np.ndarray) -> str:
     return " " * 6 + "".join(f" {value:13.6E}" for value in values) + "\n"
 
 
-def _point_rows(block: Block, at: PointFields, numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _point_rows(block: Block, at: AtPoints, numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return number, point and components of elements at CalculiX's points."""
     places, layers = points_of(block.element, at.collapses)
     own = np.einsum("mq,cq...->cm...", at.to(places), values)
     own = np.tile(own, (1, layers, *[1] * (own.ndim - 2)))
     points = np.tile(np.arange(1, own.shape[1] + 1), len(own))
-    parts = [own.ravel()]
+    parts = [own[..., k].ravel() for k in range(own.shape[2])] if own.ndim == 3 else [own.ravel()]
     if own.ndim == 4:
         parts = [own[..., i, j].ravel() for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     return np.column_stack([np.repeat(numbers, own.shape[1]), points, *parts])

@@ -208,12 +208,12 @@ class HeatAtNodes(HeatPart):
     Attributes:
         body: Name of the body.
         nodes: Name of a node set of its mesh, or of a surface.
-        value: Heat at each node, [power], a function of points, or a number.
+        value: Heat at each node, [power].
     """
 
     body: str
     nodes: str
-    value: Value
+    value: float
 
     def __post_init__(self) -> None:
         """Reject what is no heat."""
@@ -230,7 +230,7 @@ class HeatAtNodes(HeatPart):
 
     def exchange(self, on: Place, temperature: np.ndarray) -> Exchange:
         """Return what it gives to a subdomain."""
-        return given(self._at(self.value, on.points) * on.share(self.nodes))
+        return given(self.value * on.share(self.nodes))
 
 
 class Film(OnSurface):

@@ -94,6 +94,7 @@ class FrdField:
         "TOSTRAIN": ("EXX", "EYY", "EZZ", "EXY", "EYZ", "EZX"),
         "FORC": ("F1", "F2", "F3"),
         "PE": ("PE",),
+        "RFL": ("RFL",),
         "CONTACT": ("COPEN", "CSLIP1", "CSLIP2", "CPRESS", "CSHEAR1", "CSHEAR2"),
         "NDTEMP": ("T",),
         "FLUX": ("F1", "F2", "F3"),

@@ -35,26 +35,16 @@ if TYPE_CHECKING:
     from fenics_contact._fem.mechanics import Response
 
 
-@displayed
 @dataclass(frozen=True, eq=False)
-class PointFields:
-    """Stress and strain of one body at the points of the quadrature of its cells, replicated on all ranks.
+class AtPoints:
+    """Values at the points of the quadrature of the cells of one body.
 
     Attributes:
         positions: Of the points in the reference cell, [0, 1] in each direction, shape (n_points, dim). Cells
             of other shapes are hexahedra some of whose vertices coincide.
-        stress: Shape (n_cells, n_points, 3, 3), [force / length²], Cauchy's where bodies deform much.
-        strain: Shape (n_cells, n_points, 3, 3): ½ (∇u + ∇uᵀ), where bodies deform much ½ (FᵀF − 1). Normal to
-            plane bodies it is zero, in plane stress with isotropic materials −ν/E (σ₁₁ + σ₂₂), without what
-            heat adds.
-        plastic_strain: Shape (n_cells, n_points): the accumulated equivalent plastic strain, zero in
-            materials without one.
     """
 
     positions: np.ndarray
-    stress: np.ndarray
-    strain: np.ndarray
-    plastic_strain: np.ndarray
     _cell: CellType
 
     @property
@@ -109,6 +99,26 @@ class PointFields:
         return _own_places(name, order) @ matrix if self.collapses else matrix
 
 
+@displayed
+@dataclass(frozen=True, eq=False)
+class PointFields(AtPoints):
+    """Stress and strain of one body at the points of the quadrature of its cells, replicated on all ranks.
+
+    Attributes:
+        positions: See `AtPoints`.
+        stress: Shape (n_cells, n_points, 3, 3), [force / length²], Cauchy's where bodies deform much.
+        strain: Shape (n_cells, n_points, 3, 3): ½ (∇u + ∇uᵀ), where bodies deform much ½ (FᵀF − 1). Normal to
+            plane bodies it is zero, in plane stress with isotropic materials −ν/E (σ₁₁ + σ₂₂), without what
+            heat adds.
+        plastic_strain: Shape (n_cells, n_points): the accumulated equivalent plastic strain, zero in
+            materials without one.
+    """
+
+    stress: np.ndarray
+    strain: np.ndarray
+    plastic_strain: np.ndarray
+
+
 def _linear_in_prism(places: np.ndarray) -> np.ndarray:
     """Return 1, x and y of a triangle times 1 and z at places in the cube that is the prism, (m, 6)."""
     x, y, z = places[:, 0] * (1.0 - places[:, 1]), places[:, 1], places[:, 2]
@@ -148,7 +158,7 @@ class PointStress(CellStress):
 
 
 @dataclass(frozen=True, eq=False)
-class _Points:
+class QuadraturePoints:
     """The points of the quadrature of the cells of a body, and the displacements of its nodes."""
 
     body: Body
@@ -205,7 +215,7 @@ def point_fields(
     `displacement`: of its nodes; `responses`: of materials of subdomains of this rank that remember.
     """
     body, comm = torn.scene.bodies[name], torn.decomposition.comm
-    points = _Points(body, displacement)
+    points = QuadraturePoints(body, displacement)
     points_stress = PointStress(u.function_space.mesh, body, comm, temperature_of(torn.scene.loads, name))
     stress = _gathered(points_stress, u, body, len(points.positions))
     _put_mean_pressure(body, stress)
@@ -215,7 +225,7 @@ def point_fields(
         _overwrite(comm, stress, [(at, end.stress) for at, end in mine if end.stress is not None])
         found = [(at, _plastic_strain(body, at, end.history)) for at, end in mine if end.history is not None]
         _overwrite(comm, plastic, found)
-    return PointFields(points.positions, stress, points.strain(stress), plastic, body.element.cell)
+    return PointFields(points.positions, body.element.cell, stress, points.strain(stress), plastic)
 
 
 def _gathered(at: PointStress, u: _dolfinx.fem.Function, body: Body, count: int) -> np.ndarray:
@@ -268,13 +278,19 @@ def forces_at_rest(torn: TornSystem, name: str, mesh: _dolfinx.mesh.Mesh) -> np.
     temperature = temperature_of(torn.scene.loads, name)
     if not (temperature.loads or temperature.initial) or any(map(is_nonlinear, body.materials)):
         return np.zeros_like(body.mesh.points)
-    points = _Points(body, np.zeros_like(body.mesh.points))
+    points = QuadraturePoints(body, np.zeros_like(body.mesh.points))
     at, rest = PointStress(mesh, body, comm, temperature), _dolfinx.coefficient(mesh, "u")
-    nodal = points.gradients.force(points.weights, _gathered(at, rest, body, len(points.positions)))
-    cells, apart = body.mesh.apart
+    return added_up(
+        body.mesh, points.gradients.force(points.weights, _gathered(at, rest, body, len(points.positions)))
+    )
+
+
+def added_up(mesh: BodyMesh, nodal: np.ndarray) -> np.ndarray:
+    """Return sums at nodes, (n_nodes, k), of values at those of cells, (n_cells, n, k), as hexahedra."""
+    cells, apart = mesh.apart
     columns, count = np.moveaxis(nodal, 2, 0), int(cells.max()) + 1
     force = np.stack([np.bincount(cells.ravel(), each.ravel(), count) for each in columns], axis=1)
     force = force if apart is None else np.asarray(apart.T @ force)
-    force = np.pad(force, ((0, body.mesh.n_nodes - len(force)), (0, 0)))
-    followers = body.mesh.followers
+    force = np.pad(force, ((0, mesh.n_nodes - len(force)), (0, 0)))
+    followers = mesh.followers
     return np.asarray(followers.followed(len(force)).T @ force) if followers else force

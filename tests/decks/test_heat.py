@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.decks import DeckError, HeatDeck, read_deck, read_heat_deck
+from fenics_contact.decks import DeckError, HeatDeck, Increment, read_deck, read_heat_deck, run_job
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.heat import HeatState
 from fenics_contact.mesh import quadratic
 from tests.decks.texts import deck, mesh_cards
+from tests.frd_files import read_frd
 
 COPPER = "*MATERIAL, NAME=COPPER\n*CONDUCTIVITY\n0.4\n*DENSITY\n9.E-6\n*SPECIFIC HEAT\n400.\n"
 SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=COPPER\n"
@@ -222,3 +223,44 @@ def test_decks_of_statics_name_what_conducts(tmp_path: Path) -> None:
         read_deck(deck(tmp_path, BAR + steady(COLD)))
     with pytest.raises(DeckError, match=r"all steps must be \*HEAT TRANSFER"):
         read_heat_deck(deck(tmp_path, BAR + steady(COLD) + "*STEP\n*STATIC\n*END STEP\n"))
+
+
+def test_jobs_write_temperatures_fluxes_and_heat_of_nodes(tmp_path: Path) -> None:
+    asked = "*NODE PRINT, NSET=BAR_X1, TOTALS=YES\nNT, RFL\n*EL PRINT, ELSET=BAR\nHFL\n"
+    asked += "*NODE FILE\nNT, RFL\n*EL FILE\nHFL\n"
+    path = deck(tmp_path, BAR + steady(COLD + "*FILM\n4, F4, 100., 0.3\n" + asked))
+    seen: list[Increment] = []
+    files = run_job(path, MPI.COMM_SELF, watch=seen.append)
+    assert [file.suffix for file in files] == [".frd", ".dat", ".sta", ".cvg"]
+    assert [(each.step, each.time) for each in seen] == [(1, 1.0)]
+    end, heat = 80.0, 0.3 * (100.0 - 80.0)
+    lines = path.with_suffix(".dat").read_text().splitlines()
+    start = lines.index(" temperatures for set BAR_X1 and time  0.1000000E+01") + 2
+    values = [row.split() for row in lines[start : start + 4]]
+    assert [float(value) for _, value in values] == pytest.approx([end] * 4, rel=1e-6)
+    start = lines.index(" heat generation for set BAR_X1 and time  0.1000000E+01") + 2
+    assert [float(row.split()[1]) for row in lines[start : start + 4]] == pytest.approx(
+        [heat / 4] * 4, rel=1e-6
+    )
+    start = lines.index(" total heat generation for set BAR_X1 and time  0.1000000E+01") + 2
+    assert float(lines[start]) == pytest.approx(heat, rel=1e-6)
+    start = lines.index(" heat flux (elem, integ.pnt.,qx,qy,qz) for set BAR and time  0.1000000E+01") + 2
+    rows = np.array([row.split() for row in lines[start : start + 32]], dtype=float)
+    assert rows[:, 0].tolist() == np.repeat([1, 2, 3, 4], 8).tolist()
+    assert rows[:, 2:] == pytest.approx(np.tile([-heat, 0.0, 0.0], (32, 1)), abs=1e-6)
+    found = read_frd(path.with_suffix(".frd"))
+    assert [each.kind for each in found.blocks] == ["NDTEMP", "RFL", "FLUX"]
+    last = max(found.nodes)
+    assert found.block("NDTEMP").values[last] == pytest.approx([end], rel=1e-5)
+    assert found.block("FLUX").values[last] == pytest.approx([-heat, 0.0, 0.0], abs=1e-5)
+    assert found.block("RFL").values[last] == pytest.approx([heat / 4], rel=1e-5)
+
+
+def test_heat_of_nodes_is_conserved_in_curved_cells_and_rings(tmp_path: Path) -> None:
+    mesh = mesh_cards({"BAR": quadratic(rectangle((1, 0), (5, 1), (4, 1)))}, element="DCAX8")
+    held = "*BOUNDARY\nBAR_X0, 11, , 20.\nBAR_X1, 11, , 60.\n*NODE PRINT, NSET=BAR_X1, TOTALS=ONLY\nRFL\n"
+    path = deck(tmp_path, mesh + COPPER + SECTION + steady(held))
+    run_job(path, MPI.COMM_SELF)
+    total = float(path.with_suffix(".dat").read_text().split()[-1])
+    # A sector of two degrees, as CalculiX has it.
+    assert total == pytest.approx(2.0 * np.pi * 0.4 * 40.0 / np.log(5.0) / 180.0, rel=1e-3)
