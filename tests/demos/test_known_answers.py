@@ -62,6 +62,10 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
         {"volume": 1.4535, "depth": 0.092449, "new_pressure": 46.2801, "life": 21952.2},
         {"depth", "pressure", "stress"},
     ),
+    "power_module": (
+        {"chip": [85.4034, 80.0862, 75.2802, 73.197], "hottest": 77.3009, "joint_resistance": 0.0437162},
+        {"temperature", "flux", "jump", "pressure"},
+    ),
     "orthotropic": (
         {"force": 1849.15, "half_axes": [3.20134, 2.71753], "angle": 89.153},
         {"stress", "pressure"},
