@@ -4,18 +4,18 @@
 #
 # ![The harder it is clamped, the cooler the chip](../docs/pictures/power_module_pressure.png)
 #
-# A chip of silicon of 10 mm × 10 mm turns 60 W into heat. It is soldered to a plate of copper of 40 mm × 40 mm,
-# which is clamped dry on a heat sink of aluminium, which air cools. Where copper and aluminium touch, heat
-# crosses the peaks of both surfaces, the more of them the harder they are pressed, and the air between. Cooper,
-# Mikic and Yovanovich's law says how much: with the pressure $p$, the hardness $H$ and the roughness $\sigma$
-# with its slope $m$
+# A chip of silicon of 10 mm × 10 mm turns 60 W into heat. It is soldered to a plate of copper of 40 mm ×
+# 40 mm, which is clamped dry on a heat sink of aluminium, which air cools. Where copper and aluminium touch,
+# heat crosses the peaks of both surfaces, the more of them the harder they are pressed, and the air between.
+# Cooper, Mikic and Yovanovich's law says how much: with the pressure $p$, the hardness $H$ and the roughness
+# $\sigma$ with its slope $m$
 #
 # $$ h = 1.25\,\frac{k\,m}{\sigma}\left(\frac pH\right)^{0.95} + \frac{k_\mathrm{air}}{g_0}. $$
 #
 # **By hand.** Under a thin chip the flux into the copper is nearly even. In cosines over the plate,
 # $\cos\frac{m\pi x}{L}\cos\frac{n\pi y}{L}$, each of which decays with
-# $\kappa = \frac{\pi}{L}\sqrt{m^2+n^2}$, layers and joints are resistances in a row: a layer of thickness $t$ and
-# conductivity $k$ on a resistance $Z$ has
+# $\kappa = \frac{\pi}{L}\sqrt{m^2+n^2}$, layers and joints are resistances in a row: a layer of thickness $t$
+# and conductivity $k$ on a resistance $Z$ has
 #
 # $$ Z' = \frac{Z + \tanh(\kappa t)/(k\kappa)}{1 + k\kappa Z\tanh(\kappa t)}, $$
 #
@@ -140,7 +140,9 @@ def by_hand(pressure: float, waves: int = 400) -> float:
 # ## Pictures and files
 
 units = pictures.Units(temperature="°C")
-pictures.plot_field(state, "temperature", folder / "temperature.png", title="A quarter of the module", units=units)
+pictures.plot_field(
+    state, "temperature", folder / "temperature.png", title="A quarter of the module", units=units
+)
 pictures.plot_field(
     state, "heat_flux", folder / "flux.png", bodies=["copper", "sink"], title="Under the chip", units=units
 )

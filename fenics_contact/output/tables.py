@@ -77,7 +77,7 @@ def write_contact_table(state: OnBodies, path: str | Path, *, pair: int | str | 
         if comm.rank == 0:
             mine = np.lexsort((columns["node"], number))
             rows = mine if chosen is None else mine[number[mine] == chosen]
-            remark = "one row a contact point; forces by area act on the slave, heat leaves it; units are those of the scene"
+            remark = "one row a contact point; forces act on the slave, heat leaves it; units of the scene"
             table = zip(*([values[row] for row in rows] for values in columns.values()), strict=True)
             write_text(target, csv_text([remark], list(columns), table))
     return target
