@@ -1,4 +1,4 @@
-"""What will be built for a scene of heat: its effects, unknowns, rows and memory."""
+"""What will be built for a scene of heat: unknowns, rows and memory."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.display import counted
 from fenics_contact._scene.discretisation import in_words
 from fenics_contact._scene.memory import Subdomains, expected_memory
 from fenics_contact._scene.pair_geometry import pair_geometry
@@ -17,58 +17,43 @@ from fenics_contact._scene.tools import check_partitions
 from fenics_contact.mesh.cuts import pieces
 
 
-@displayed
 @dataclass(frozen=True)
 class HeatPlan:
     """What the temperatures of a scene need; nothing else is built.
 
     Attributes:
-        effects: The physical effects by name, and how many parts of the scene have each.
+        effects: How many parts of the scene have each physical effect.
         subdomains: Number of subdomains, each with one constant in the coarse problem.
-        kinds: Those of different shape, conductivity or interface, see `fenics_contact.Plan`.
-        unknowns: Temperatures of all subdomains.
+        unknowns: Their temperatures.
         multipliers: Rows by kind; those of ties and contacts are upper bounds.
         memory: Expected memory of all ranks together without their libraries, [bytes].
-        contacts: Between which surfaces heat passes; ties: where each is enforced, and why.
+        joints: Between which surfaces heat passes, and where, in words.
     """
 
     effects: Mapping[str, int]
     subdomains: int
-    kinds: int
     unknowns: int
     multipliers: Mapping[str, int]
     memory: float
-    contacts: tuple[str, ...]
-    ties: tuple[str, ...]
+    joints: tuple[str, ...]
 
     def __str__(self) -> str:
         """Return one line for each decision."""
-        return "\n".join(f"{name:15s} {value}" for name, value in self._facts().items())
-
-    def _facts(self) -> dict[str, str]:
-        alike = f" of {counted(self.kinds, 'kind')}" if self.kinds < self.subdomains else ""
-        return {
+        rows = {
             "heat": "; ".join(f"{name} ({count})" for name, count in self.effects.items()),
-            "temperatures": f"{self.unknowns} in {counted(self.subdomains, 'subdomain')}{alike}",
+            "temperatures": f"{self.unknowns} in {counted(self.subdomains, 'subdomain')}",
             "rows of heat": ", ".join(f"{n} {kind}" for kind, n in self.multipliers.items() if n) or "none",
             "memory of heat": f"{self.memory / 1e6:.0f} MB",
-            **{f"joint {number}": joint for number, joint in enumerate(self.contacts)},
-            **{f"heat tie {number}": tie for number, tie in enumerate(self.ties)},
+            **{f"joint {number}": words for number, words in enumerate(self.joints)},
         }
+        return "\n".join(f"{name:15s} {words}" for name, words in rows.items())
 
 
 def make_plan(
-    field: Scene,
-    geometry: Scene,
-    effects: Mapping[str, int],
-    places: Sequence[str],
-    partitions: Mapping[str, np.ndarray],
-    ranks: int,
-) -> HeatPlan:
-    """Decide what a scene needs: its field, its surfaces, and in words what acts and where its contacts are.
-
-    `ranks`: among which the subdomains are dealt out.
-    """
+    field: Scene, geometry: Scene, effects: Mapping[str, int], places: Sequence[str],
+    partitions: Mapping[str, np.ndarray], ranks: int,
+) -> HeatPlan:  # fmt: skip
+    """Return the plan of a field and its surfaces; `effects`, `places`: what acts, and contacts in words."""
     check_partitions(field.bodies, partitions)
     parts = Subdomains.of(field, {n: pieces(b.mesh, partitions[n]) for n, b in field.bodies.items()})
     unknowns = int(parts.size.sum())
@@ -83,7 +68,7 @@ def make_plan(
         "passing heat": slaves(geometry.contacts),
     }
     pairs = zip(places, geometry.contacts, strict=True)
-    joints = tuple(f"{place}; {pair_geometry(geometry, pair)}" for place, pair in pairs)
-    ties = tuple(f"{tie.place}; {in_words(tie)}" for tie in geometry.ties)
-    sizes = len(parts.size), parts.kinds(ranks), unknowns
-    return HeatPlan(effects, *sizes, rows, expected_memory(field, parts, ranks), joints, ties)
+    joints = [f"{place}; {pair_geometry(geometry, pair)}" for place, pair in pairs]
+    joints += [f"{tie.place}; {in_words(tie)}" for tie in geometry.ties]
+    memory = expected_memory(field, parts, ranks)
+    return HeatPlan(effects, len(parts.size), unknowns, rows, memory, tuple(joints))
