@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -23,13 +24,16 @@ from fenics_contact._cli.console import (
 from fenics_contact._cli.options import checkpoint_of, forget, plan_of_states, resumable, scene_command
 from fenics_contact._cli.view import Gallery, can_draw, draw_meshes, draw_state
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene_file.heat import HeatFile
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import LoadStepError
 from fenics_contact.output.files import only_run_in
+from fenics_contact.output.heat import write_heat_balance
 from fenics_contact.output.paraview import ResultSeries, write_vtu, write_xdmf
 from fenics_contact.output.result import forces_record, write_result
 from fenics_contact.output.tables import StepTable, step_row, write_contact_table
 from fenics_contact.results.deformed_state import DeformedState
+from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.state import State
 
 #: Largest number of load steps with maps of the status.
@@ -58,10 +62,7 @@ class Found:
 def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool) -> None:
     """Compute the equilibrium of a scene file, or its load steps."""
     with only_run_in(file.folder, console.comm):
-        if file.document.accuracy is not None:
-            found = _to_accuracy(console, file)
-        else:
-            found = Found(_through_steps(console, file, resume) if file.steps else _at_once(console, file))
+        found = _computed(file, console, resume)
         gallery = Gallery()
         if pictures and file.document.output.drawn and can_draw(console, file, gallery):
             draw_state(console, file, found.states, gallery)
@@ -72,6 +73,25 @@ def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool)
     if found.missed:
         console.write(f"the accuracy was not reached: {found.missed}")
         raise typer.Exit(int(ExitCode.NOT_CONVERGED))
+
+
+@singledispatch
+def _computed(file: SceneFile, console: Console, resume: bool | None) -> Found:
+    """Compute what a file asks for, print and write it. Collective."""
+    if file.document.accuracy is not None:
+        return _to_accuracy(console, file)
+    return Found(_through_steps(console, file, resume) if file.steps else _at_once(console, file))
+
+
+@_computed.register
+def _(file: HeatFile, console: Console, resume: bool | None) -> Found:
+    state: Any = file.solve()
+    console.write(f"{state}\n{state.balance}")
+    _write_fields(file, state)
+    if "csv" in file.document.output.files:
+        write_heat_balance([state], file.folder / "steps.csv")
+    write_result(state, file.folder, more=_origin(file))
+    return Found({file.title: state})
 
 
 run = scene_command(_run, plan=plan_of_states, check=SceneFile.check_accuracy, accurate=("accuracy", "of"))
@@ -116,18 +136,23 @@ def table_of_levels(console: Console) -> Callable[[Level], None]:
 
 def _write(file: SceneFile, state: State, accurate: AccurateResult | None = None) -> None:
     """Write the files of a scene without load steps. Collective."""
+    _write_fields(file, state)
+    if "csv" in file.document.output.files:
+        StepTable(file.folder / "steps.csv", file.comm).add(state, file.title)
+    file.write_tables(state)
+    known = state.known_errors is not None
+    write_result(state, file.folder, more=_origin(file), errors=known, accuracy=accurate)
+
+
+def _write_fields(file: SceneFile, state: OnBodies) -> None:
+    """Write fields and contact points. Collective."""
     kinds = file.document.output.files
     if "vtu" in kinds:
         write_vtu(state, file.folder)
     if "xdmf" in kinds:
         write_xdmf(state, file.folder / "state.xdmf")
-    if "csv" in kinds:
-        StepTable(file.folder / "steps.csv", file.comm).add(state, file.title)
-        if file.scene.contacts:
-            write_contact_table(state, file.folder / "contact.csv")
-    file.write_tables(state)
-    known = state.known_errors is not None
-    write_result(state, file.folder, more=_origin(file), errors=known, accuracy=accurate)
+    if "csv" in kinds and file.scene.contacts:
+        write_contact_table(state, file.folder / "contact.csv")
 
 
 @contextmanager

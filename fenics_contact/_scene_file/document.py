@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, PositiveInt
@@ -431,15 +431,21 @@ class UnitNames(Part):
     stress: str = Field(default="MPa", description="unit of stresses, moduli and pressures: force / length²")
 
 
-class BodyPart(Part):
+class MadeOf(Part):
+    """What is made of materials, and of which, in words."""
+
+    kind_of_material: ClassVar[str] = "a material"
+    material: Materials = Field(
+        description="name of a material of [materials], or one for each region of the mesh"
+    )
+
+
+class BodyPart(MadeOf):
     """A body: a mesh and what it is made of."""
 
     mesh: str = Field(description="name of a mesh of [meshes]")
     part: str | None = Field(
         None, description="which body of a mesh that has several, such as a group of a file"
-    )
-    material: Materials = Field(
-        description="name of a material of [materials], or one for each region of the mesh"
     )
     axisymmetric: bool = Field(
         False, description="whether a plane mesh is half the section (r, z) of a body of revolution"
@@ -513,6 +519,13 @@ class Document(Part):
     )
     output: OutputPart = Field(OutputPart(), description="what is written, and where")
     design: DesignPart | None = Field(None, description="a shape optimisation, for `fenics-contact optimize`")
+    heat: None = Field(None, description="what bodies conduct, in files with [bodies.NAME.heat]")
+    #: Names of a section, by what they must be in words.
+    known: ClassVar[Mapping[str, Collection[str]]] = {}
+
+    def misfits(self) -> Iterator[tuple[Keys, str]]:
+        """Yield keys that do not go with others, and why."""
+        yield from ()
 
 
 def references(document: Document) -> Iterator[tuple[Keys, str]]:

@@ -68,6 +68,13 @@ if TYPE_CHECKING:
 _FORMULAS = {"supports": ("value",), "loads": ("value",), "contacts": ("master", "formula")}
 
 
+def made_of(given: str | Mapping[str, str], materials: Mapping[str, Any]) -> Any:
+    """Return the material of a body, or that of each of its regions by name."""
+    if isinstance(given, str):
+        return materials[given]
+    return {region: materials[name] for region, name in given.items()}
+
+
 class Builder:
     """Builds the parts in order and collects their mistakes.
 
@@ -79,12 +86,17 @@ class Builder:
         self._source, self._document, self._comm = source, document, comm
         self._mistakes: list[Mistake] = []
 
-    def bodies(self) -> tuple[dict[str, Body], dict[str, Shaped]]:
-        """Return the bodies with their shapes. Collective."""
+    def shapes(self) -> dict[str, Mapping[str, Shaped]]:
+        """Return what meshes hold by the names of their parts. Collective."""
         shapes: dict[str, Mapping[str, Shaped]] = {}
         for name, mesh in self._document.meshes.items():
             with self._at("meshes", name):
                 shapes[name] = mesh.build(self._source.folder, self._comm)
+        return shapes
+
+    def bodies(self) -> tuple[dict[str, Body], dict[str, Shaped]]:
+        """Return the bodies with their shapes. Collective."""
+        shapes = self.shapes()
         materials: dict[str, Material] = {}
         for name, part in self._document.materials.items():
             with self._at("materials", name):
@@ -94,11 +106,7 @@ class Builder:
         for name, body in self._document.bodies.items():
             with self._at("bodies", name):
                 chosen[name] = self._part_of(name, body, shapes[body.mesh])
-                made_of: Any = body.material
-                if isinstance(made_of, str):
-                    given: Any = materials[made_of]
-                else:
-                    given = {region: materials[part] for region, part in made_of.items()}
+                given: Any = made_of(body.material, materials)  # type: ignore[arg-type]
                 ways = body.axisymmetric, body.torsion, body.integration
                 made[name] = Body(chosen[name].mesh, given, *ways)
         self._check()
@@ -364,6 +372,11 @@ class SceneFile:
     source: Source
     document: Document
     comm: MPI.Comm
+
+    @classmethod
+    def documents(cls) -> type[Document]:
+        """Return the form of its data."""
+        return Document
 
     @property
     def name(self) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from fenics_contact._base.progress import is_visible
-from fenics_contact._scene_file.document import Document
+from fenics_contact._scene_file.document import Document, MadeOf
 from fenics_contact._scene_file.part import Part, values_of
 from fenics_contact._scene_file.source import (
     Mistake,
@@ -50,6 +50,7 @@ def wrong_names(source: Source, document: Document) -> list[Mistake]:
         "the name of a preload": _names(document.preloads),
         "the name of a constraint": _names(document.constraints),
         "the name of a fluid": _names(part.fluid for part in document.contacts if part.fluid),
+        **document.known,
     }
     used = _references(document)
     wrong = [
@@ -58,6 +59,7 @@ def wrong_names(source: Source, document: Document) -> list[Mistake]:
     return wrong or [
         *_twice(source, document), *_unlike(source, document), *_wrong_pairs(source, document),
         *_not_halved(source, document),
+        *(source.mistake(path, f"{written(path)} {words}") for path, words in document.misfits()),
     ]  # fmt: skip
 
 
@@ -91,9 +93,10 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
     """Yield every name that is used, with its path and what it must name."""
     for name, body in document.bodies.items():
         yield ("bodies", name, "mesh"), body.mesh, "a mesh"
-        made_of: Any = body.material
-        for path, material in parts_of(made_of, str, ("bodies", name, "material")):
-            yield path, material, "a material"
+    for place, made in parts_of(document, MadeOf):
+        of: Any = made.material
+        for path, material in parts_of(of, str, (*place, "material")):
+            yield path, material, made.kind_of_material
     for path, body in values_of(document, "body"):
         yield path, body, "a body"
     cuts = document.solver.subdomains
@@ -192,11 +195,15 @@ def json_schema() -> dict[str, Any]:
     Editors that know TOML by schema (taplo, Even Better TOML) complete and check a file whose first line is
     ``#:schema scene_file.schema.json``; ``fenics-contact schema`` writes it.
     """
-    schema = Document.model_json_schema()
+    from fenics_contact._scene_file.heat_tables import HeatDocument  # not for scenes without heat
+
+    schema = HeatDocument.model_json_schema()
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **schema,
         "title": "Scene file of fenics_contact",
+        "required": ["meshes", "bodies"],
+        "anyOf": [{"required": ["materials"]}, {"required": ["heat"]}],
     }
 
 
@@ -220,13 +227,13 @@ NEEDED = {
 }
 
 
-def validated(source: Source) -> Document:
+def validated(source: Source, kind: type[Document] = Document) -> Document:
     """Return the checked document of a source."""
     unseen = invisible_texts(source)
     if unseen:
         raise SceneFileError(source.name, unseen)
     try:
-        return Document.model_validate(source.data)
+        return kind.model_validate(source.data)
     except ValidationError as error:
         mistakes = [_mistake(source, each) for each in _without_misspelt(error.errors())]
         raise SceneFileError(source.name, mistakes) from None

@@ -34,7 +34,7 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "[[contact]]",
         "scene.toml, line 37: contact is not known: did you mean 'contacts'? the keys of the file are title, "
         "units, meshes, materials, bodies, supports, loads, contacts, automatic_contact, ties, "
-        "preloads, foundations, springs, constraints, steps, solver, accuracy, output, design",
+        "preloads, foundations, springs, constraints, steps, solver, accuracy, output, design, heat",
     ),
     "a key is missing": (
         "poisson_ratio = 0.3\n",
