@@ -16,7 +16,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.torn import contact_and_tied_points
 from fenics_contact.heat.conductance import Touch
-from fenics_contact.heat.curvature import shells
+from fenics_contact.heat.curvature import shells, stretch
 from fenics_contact.heat.rows import ConductingRows
 from fenics_contact.heat.scene import HeatScene
 
@@ -119,10 +119,10 @@ def _described(scene: HeatScene, points: ContactPoints) -> tuple[np.ndarray, ...
     for number, contact in enumerate(scene.contacts):
         mine = np.flatnonzero(points.pair == number)
         pair = scene.geometry.contacts[number]
-        area[mine] *= scene.bodies[pair.slave.body].thickness
         pressure[mine] = not_negative(f"the pressure of {contact.place}", contact.pressure, places[mine])
         surface = slave_of(scene.geometry, pair, pair.slave_geometry)
         place = np.searchsorted(surface.nodes, points.slave[mine] - numbers.first_of(pair.slave.body))
+        area[mine] *= scene.bodies[pair.slave.body].thickness * stretch(surface)[place]
         spread[mine], ratio[mine] = shells(surface, place, points.gap[mine])
         if not pair.between_bodies:
             on_obstacle[mine], given = True, contact.temperature

@@ -271,7 +271,7 @@ class _Iteration:
         heat[conductance * self.joints.area > 0.0] = passing
         balance = self._balance(torn, solution, field, heated, (heat, tied), friction)
         return HeatState(
-            self.scene, torn, system, solution, self.joints, values,
+            self.scene, torn, heated, system, solution, self.joints, values,
             self._contacts(values, conductance, heat, friction.sum(axis=0)), tied, balance,
             counts[0], counts[1] + system.products, dict(self.problem.timer.seconds),
         )  # fmt: skip

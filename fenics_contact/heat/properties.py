@@ -56,6 +56,10 @@ class Property(ABC):
     def at(self, temperature: np.ndarray) -> np.ndarray:
         """Return its values at temperatures, of the same shape."""
 
+    def at_points(self, points: np.ndarray, temperature: np.ndarray) -> np.ndarray:
+        """Return its values at points, shape (..., dim), and temperatures there, (...)."""
+        return self.at(temperature)
+
     def fields(self, temperature: np.ndarray) -> Fields:
         """Return the fields of its form at temperatures of nodes, shape (n,)."""
         return (self.at(temperature),)
@@ -146,6 +150,15 @@ class ByUfl(Property):
             f"{self.name} is given as Ufl, of which there are no values outside of forms: give a function of "
             "temperatures or a TemperatureTable"
         )
+
+    def at_points(self, points: np.ndarray, temperature: np.ndarray) -> np.ndarray:
+        """Return what the function does, point by point: UFL has no arrays."""
+        import ufl
+
+        flat = zip(points.reshape(-1, points.shape[-1]).tolist(), temperature.ravel().tolist(), strict=True)
+        with user_code(f"the function given as {self.name}"):
+            values = [self.given.function(ufl.as_vector(x), ufl.as_ufl(T)) for x, T in flat]  # type: ignore[call-arg]
+            return np.array([ufl.as_ufl(each)(()) for each in values]).reshape(temperature.shape)
 
     def fields(self, temperature: np.ndarray) -> Fields:
         """Return the temperature."""
@@ -286,9 +299,9 @@ class Conductor:
         """Whether nothing depends on the temperature."""
         return not any(each.varies for each in (*self.tensor.ravel(), *self.capacities))
 
-    def conducted(self, temperature: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-        """Return k ∇T at points, shape (..., dim), by temperatures, (...)."""
-        k = np.array([each.at(temperature) for each in self.tensor.ravel()])
+    def conducted(self, points: np.ndarray, temperature: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        """Return k ∇T at points, shape (..., dim), by temperatures there, (...)."""
+        k = np.array([each.at_points(points, temperature) for each in self.tensor.ravel()])
         k = np.moveaxis(k, 0, -1).reshape(*temperature.shape, *self.tensor.shape)
         if self.tensor.ndim == 2:
             return np.asarray(np.einsum("...ij,...j->...i", k, gradient))

@@ -157,15 +157,15 @@ class ConductingBody:
             return np.sort(self.mesh.regions[list(self.mesh.regions)[number]])
         return np.arange(self.mesh.n_cells)
 
-    def conducted(self, temperature: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    def conducted(self, points: np.ndarray, temperature: np.ndarray, gradient: np.ndarray) -> np.ndarray:
         """Return k ∇T at points of all cells, shape (n_cells, m, dim).
 
-        `temperature`: (n_cells, m); `gradient`: (n_cells, m, dim).
+        `points`: (n_cells, m, dim); `temperature`: (n_cells, m); `gradient`: (n_cells, m, dim).
         """
         result = np.empty_like(gradient)
         for number, material in enumerate(self.materials):
             cells = self.cells_of(number)
-            result[cells] = material.conducted(temperature[cells], gradient[cells])
+            result[cells] = material.conducted(points[cells], temperature[cells], gradient[cells])
         return result
 
     def _facts(self) -> dict[str, Any]:

@@ -12,12 +12,15 @@ import numpy as np
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.scene import Scene
+from fenics_contact.errors import collectively
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
+from fenics_contact.heat.assembly import Heated
 from fenics_contact.heat.fields import contact_columns, fields_of, record_of
 from fenics_contact.heat.joints import Joints
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.mesh.cell_types import cell_type_of, quadrature, shape_gradients, shape_values
+from fenics_contact.mesh.collapsed import as_hexahedra, places_of
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.results.fields import GatheredFields, body_mesh, nodal_function
 from fenics_contact.results.on_bodies import OnBodies
@@ -94,6 +97,7 @@ class HeatState(OnBodies):
     Attributes:
         scene: The scene.
         torn: The torn system that was solved.
+        heated: Its subdomains on this rank, with what they exchange with loads.
         system: Its dual.
         solution: The result of the dual solver.
         joints: The points of contacts and ties.
@@ -108,6 +112,7 @@ class HeatState(OnBodies):
 
     scene: HeatScene
     torn: TornSystem
+    heated: tuple[Heated, ...]
     system: DualSystem
     solution: DualSolution
     joints: Joints
@@ -169,6 +174,40 @@ class HeatState(OnBodies):
             name: cell_flux(self.scene, name, temperature) for name, temperature in self.temperature.items()
         }
 
+    @collectively("HeatState.nodal_flux", lambda self, *_: self.torn.decomposition.comm)
+    def nodal_flux(self, body: str) -> np.ndarray:
+        """Return the heat flux at the nodes of a body, recovered in each of its materials. Collective.
+
+        Its order is one above that of `flux`: around each node a polynomial of one degree more than the
+        temperature is fitted to those of the nodes near by, and −k ∇T is that of its slope.
+
+        Args:
+            body: Name of the body.
+
+        Returns:
+            Shape (n_materials, n_nodes, dim), NaN where a node has no cell of the material, [power /
+            length²].
+        """
+        from fenics_contact.heat.accuracy import nodal_flux
+
+        return nodal_flux(self, body)
+
+    @collectively("HeatState.heat_through", lambda self, *_: self.torn.decomposition.comm)
+    def heat_through(self, body: str, surface: str) -> float:
+        """Return the heat that enters a body through any of its named surfaces, [power]. Collective.
+
+        It is what is left of the balance of each node, and loads as they were integrated: heat through
+        surfaces that make up the boundary of a body adds up to what its sources lack and it stores, to
+        rounding, and is far more accurate than integrals of the flux. That of a node on several surfaces
+        which hold or touch counts for each by its area around the node.
+
+        Example:
+            >>> state.heat_through("lower", "z0")  # doctest: +SKIP
+        """
+        from fenics_contact.heat.accuracy import heat_through
+
+        return heat_through(self, body, surface)
+
     def _facts(self) -> dict[str, Any]:
         ranges = {
             f"temperature of {name}": f"{own.min():.6g} to {own.max():.6g}"
@@ -187,12 +226,12 @@ def cell_flux(scene: HeatScene, name: str, temperature: np.ndarray) -> np.ndarra
     body = scene.bodies[name]
     mesh, cell = body.mesh, cell_type_of(body.mesh.cells, body.mesh.dim)
     positions, weights = quadrature(cell, 2)
-    gradients = shape_gradients(cell, positions)
-    nodes = mesh.cells
-    jacobian = np.einsum("qkd,cke->cqed", gradients, mesh.points[nodes])
-    slopes = np.einsum("qkd,cqde->cqke", gradients, np.linalg.inv(jacobian))
-    gradient = np.einsum("cqke,ck->cqe", slopes, temperature[nodes])
-    at = np.einsum("qk,ck->cq", shape_values(cell, positions), temperature[nodes])
+    gradients, shape = shape_gradients(cell, positions), shape_values(cell, positions)
+    corners = places_of(mesh.points, mesh.cells)
+    values = as_hexahedra(temperature[mesh.cells], mesh.cells, mesh.dim)
+    jacobian = np.einsum("qkd,cke->cqed", gradients, corners)
+    gradient = np.einsum("qkd,cqde,ck->cqe", gradients, np.linalg.inv(jacobian), values, optimize=True)
     measure = weights * np.abs(np.linalg.det(jacobian))
-    flux = -body.conducted(at, gradient)
+    places = np.einsum("qk,cke->cqe", shape, corners)
+    flux = -body.conducted(places, values @ shape.T, gradient)
     return np.asarray(np.einsum("cq,cqe->ce", measure, flux) / measure.sum(axis=1)[:, None])
