@@ -262,9 +262,14 @@ def _read(path: Path, chosen: Chosen = _all) -> Deck:
     record = Record()
     if left:
         record.note(left[0], "this step and all behind it are left out: they are no statics")
+    return deck_of(path.name, cards, record)
+
+
+def deck_of(name: str, cards: Sequence[Card], record: Record) -> Deck:
+    """Return the deck of some cards of a file."""
     refuse_unknown(cards)
     try:
-        deck = DeckCards.of(path.name, cards, record)
+        deck = DeckCards.of(name, cards, record)
         deck, steps = steps_of(deck)
         steps = on_solids(deck, steps)
         deck = deck.cut_where_loaded(steps)
@@ -274,7 +279,7 @@ def _read(path: Path, chosen: Chosen = _all) -> Deck:
     except DeckError:
         raise
     except InvalidInputError as error:
-        raise DeckError(str(error), path.name) from error
+        raise DeckError(str(error), name) from error
 
 
 def _leading_statics(cards: Sequence[Card]) -> tuple[Sequence[Card], Sequence[Card]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +15,15 @@ from fenics_contact._base.display import displayed
 from fenics_contact._scene.pairs import Surface, Tie
 from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.cards import DeckCards, Record
-from fenics_contact.decks.deck import Deck, deck_with
+from fenics_contact.decks.deck import Deck, deck_of, deck_with
 from fenics_contact.decks.heat_materials import conductance_of, conductor_of, read_conductances
+from fenics_contact.decks.heat_statics import moving, statics_of
 from fenics_contact.decks.heat_steps import NODES, VOLUMES, Acting, HeatCards, heat_steps
 from fenics_contact.decks.names import names_of
 from fenics_contact.decks.pairs import pairs_of
 from fenics_contact.decks.steps import groups_of, read_steps
-from fenics_contact.decks.vocabulary import HEAT_CARDS, HEAT_MODEL, KNOWN, PRINT_CARDS, refuse_unknown
+from fenics_contact.decks.vocabulary import HEAT, HEAT_CARDS, HEAT_MODEL, KNOWN, PRINT_CARDS, refuse_unknown
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.heat.parts import HeldTemperature
 from fenics_contact.heat.problem import solve_heat
@@ -61,7 +63,8 @@ class HeatDeck:
         contacts: Its contact pairs with a conductance.
         ties: Its ties, whose temperatures are equal.
         initial: Initial temperatures of the nodes of each body.
-        steps: Its steps, with what makes the parts of their scenes.
+        steps: Its steps that conduct heat, with what makes the parts of their scenes.
+        moving: Numbers of the steps of the deck, from 0, in which bodies move.
     """
 
     frame: Deck
@@ -70,6 +73,8 @@ class HeatDeck:
     ties: Sequence[Tie]
     initial: Mapping[str, np.ndarray]
     steps: Sequence[tuple[HeatCards, Sequence[Placed]]]
+    moving: Sequence[int]
+    _cards: Sequence[Card] = field(repr=False)
 
     def scene(self, step: int = 0, time: float | None = None) -> HeatScene:
         """Return the scene of a step, numbered from 0, at a time since it began, by default at its end."""
@@ -80,12 +85,43 @@ class HeatDeck:
         return HeatScene(self.bodies, held, loads, self.contacts, self.ties)
 
     def solve(self, comm: MPI.Comm, **settings: Any) -> list[HeatState]:
-        """Compute the state at the end of each step. Collective; settings are those of `solve_heat`."""
-        return list(self.states(comm, **settings))
+        """Compute the state at the end of each step. Collective; settings are those of `increments`."""
+        last = {number: state for number, _, state in self.increments(comm, **settings)}
+        return list(last.values())
 
-    def states(self, comm: MPI.Comm, **settings: Any) -> Iterator[HeatState]:
-        """Yield the state at the end of each step as soon as it is known. Collective."""
-        yield from (solve_heat(self.scene(k), comm, **settings) for k in range(len(self.steps)))
+    def increments(self, comm: MPI.Comm) -> Iterator[tuple[int, float, HeatState]]:
+        """Yield step, time since it began and state where steps end. Collective."""
+        for number, (cards, _) in enumerate(self.steps):
+            if not cards.steady:
+                raise cards.card.error("heat in time is not solved yet: add STEADY STATE")
+            state = solve_heat(self.scene(number), comm)
+            yield number, cards.period, state
+
+    def statics(self, states: Sequence[HeatState]) -> Deck:
+        """Return the deck of the steps in which bodies move, at the temperatures of states.
+
+        Steps with both procedures, and *STATIC, have the temperatures of the last step that conducts heat,
+        reached along a line. Heat does not depend on the deformation.
+
+        Args:
+            states: The state at the end of each step that conducts heat.
+
+        Raises:
+            InvalidInputError: If bodies move in no step.
+        """
+        if not self.moving:
+            raise InvalidInputError(
+                f"the deck {self.frame.name} has no step in which bodies move: add *STATIC"
+            )
+        found = {}
+        for (cards, _), state in zip(self.steps, states, strict=True):
+            own = [
+                (numbers[numbers > 0], state.temperature[body][numbers > 0])
+                for body, numbers in self.frame.node_numbers.items()
+            ]
+            numbers, values = (np.concatenate(each) for each in zip(*own, strict=True))
+            found[cards.number] = numbers, values
+        return deck_of(self.frame.name, list(statics_of(self._cards, found)), Record())
 
 
 @naming_arguments
@@ -114,18 +150,20 @@ def read_heat_deck(path: str | Path, comm: MPI.Comm | None = None) -> HeatDeck:
 
 def conducts(path: Path) -> bool:
     """Return whether a step of a deck conducts heat."""
-    return path.is_file() and any(card.name == "HEATTRANSFER" for card in read_cards(path))
+    return path.is_file() and any(card.name in HEAT for card in read_cards(path))
 
 
 def _read(path: Path) -> HeatDeck:
     require_file(path, "a deck")
-    cards = [_solid(card) for card in read_cards(path)]
+    given = read_cards(path)
+    cards = [_solid(card) for card in given]
     refuse_unknown(cards, KNOWN | HEAT_CARDS)
     start = next((k for k, card in enumerate(cards) if card.name == "STEP"), len(cards))
     frame = [card for card in cards[:start] if card.name in HEAT_MODEL]
     deck = DeckCards.of(path.name, frame, Record())
+    moves = moving(cards)
     for card in cards:
-        if card.name not in HEAT_MODEL | HEAT_CARDS | PRINT_CARDS:
+        if not moves and card.name not in HEAT_MODEL | HEAT_CARDS | PRINT_CARDS:
             deck.note(card, "has no effect on heat")
         if card.name == "EQUATION" and any(len(row) > 1 and row[1] == "11" for row in card.rows):
             raise card.error("equations of temperatures are not solved: join bodies by *TIE")
@@ -136,7 +174,7 @@ def _read(path: Path) -> HeatDeck:
         deck.mesh, deck.sections, deck.of_element, deck.components, sets
     )
     deck = replace(deck, mesh=mesh, sections=sections, of_element=of_element, components=parts)
-    return _Builder(deck, cards, steps).made()
+    return replace(_Builder(deck, cards, steps).made(), moving=moves, _cards=given)
 
 
 def _solid(card: Card) -> Card:
@@ -188,11 +226,16 @@ class _Builder:
         steps = [(step, [*self._placed(step.acting)]) for step in self.steps]
         every = self.built.steps.initial
         initial = {name: every[self.parts.nodes[name][: mesh.n_nodes]] for name, mesh in meshes.items()}
+        known = any(card.name == "INITIALCONDITIONS" for card in self.cards)
+        for step in () if known else (step for step in self.steps if not step.steady):
+            raise step.card.error(
+                "needs temperatures at its start: add *INITIAL CONDITIONS, TYPE=TEMPERATURE"
+            )
         scene = HeatScene(bodies, contacts=contacts, ties=ties).geometry
         inside = [group for group in groups_of(self.cards) if group[0].name == "STEP"]
         prints = [(k, card) for k, own in enumerate(inside) for card in own if card.name in PRINT_CARDS]
-        frame = deck_with(self.built, scene, (), range(len(steps)), prints)
-        return HeatDeck(frame, bodies, contacts, ties, initial, steps)
+        frame = deck_with(self.built, scene, (), range(len(inside)), prints)
+        return HeatDeck(frame, bodies, contacts, ties, initial, steps, (), ())
 
     def _contacts(self) -> tuple[list[ThermalContact], list[Tie]]:
         """Return contact pairs with a conductance, and ties."""
@@ -202,6 +245,9 @@ class _Builder:
             law = laws.get(of.card.name_of("INTERACTION"))
             if law is None:
                 deck.note(of.card, "passes no heat: its interaction has no *GAP CONDUCTANCE")
+            elif any(step.card.name != "HEATTRANSFER" for step in self.steps):
+                words = "pressures of mechanics act on heat: solve both by solve_heated in Python"
+                raise law.error(words)
             elif isinstance(pair.master, Surface):
                 made = conductance_of(law, max(pair.adjust or 0.0, 1e-4 * size))
                 contacts.append(ThermalContact(pair.slave, pair.master, made))

@@ -73,11 +73,12 @@ class Acting(AtLine):
 class HeatCards:
     """A step of heat as the deck has it.
 
-    `card`: its procedure; `steady`: whether nothing is stored; `start` and `period`: total time before it and
-    its own; `first`: length of its first increment; `direct`: whether all have this length; `ramped`: whether
-    what has no amplitude grows from zero.
+    `number`: that of the step in the deck, from 0; `card`: its procedure; `steady`: whether nothing is
+    stored; `start` and `period`: total time before it and its own; `first`: length of its first increment;
+    `direct`: whether all have this length; `ramped`: whether what has no amplitude grows from zero.
     """
 
+    number: int
     card: Card
     steady: bool
     start: float
@@ -87,6 +88,12 @@ class HeatCards:
     ramped: bool
     acting: Sequence[Acting]
     amplitudes: Amplitudes
+
+    @property
+    def turns(self) -> list[float]:
+        """Times since it began at which amplitudes turn, and its end."""
+        times = self.amplitudes.times(np.array([each.by for each in self.acting], dtype=int), self.start)
+        return sorted({t for t in times if 1e-9 < t / self.period < 1.0 - 1e-9} | {self.period})
 
     def factors(self, time: float) -> np.ndarray:
         """Return the factors of amplitudes by their numbers at a time since the step began."""
@@ -100,6 +107,7 @@ def heat_steps(cards: Sequence[Card], mesh: DeckMesh) -> list[HeatCards]:
     amplitudes, acting, found = Amplitudes.of(cards), list[Acting](), list[HeatCards]()
     physics = [card for card in cards if card.name == "PHYSICALCONSTANTS"]
     constants = tuple(card.number_of(n) for card in physics[-1:] for n in ("ABSOLUTEZERO", "STEFANBOLTZMANN"))
+    number, start = -1, 0.0
     for head, *rest in groups_of(cards):
         new = {card.name for card in (head, *rest) if card.name_of("OP") == "NEW"}
         acting = [each for each in acting if each.card.name not in new]
@@ -110,18 +118,26 @@ def heat_steps(cards: Sequence[Card], mesh: DeckMesh) -> list[HeatCards]:
                 acting += _on_faces(card, mesh, amplitudes.number(card), constants)
         if head.name != "STEP":
             continue
-        card = next((card for card in rest if card.name in HEAT), head)
-        if card is head:
-            raise head.error("all steps must be *HEAT TRANSFER, as one is: give other steps in other decks")
+        number, card = number + 1, procedure_of([head, *rest])
         numbers = [*(card.floats(0) if card.lines else []), 0.0, 0.0]
         first, period = (each if each > 0.0 else 1.0 for each in numbers[:2])
-        steady = "STEADYSTATE" in card.parameters
-        direct = plain(card.parameters.get("DIRECT", "NO")) != "NO"
-        ramped = head.name_of("AMPLITUDE") == "RAMP" and not steady
-        start = found[-1].start + found[-1].period if found else 0.0
-        acting = _last(acting)
-        found.append(HeatCards(card, steady, start, period, first, direct, ramped, acting, amplitudes))
+        if card.name in HEAT:
+            steady = "STEADYSTATE" in card.parameters
+            direct = plain(card.parameters.get("DIRECT", "NO")) != "NO"
+            ramped = head.name_of("AMPLITUDE") == "RAMP" and not steady
+            acting = _last(acting)
+            made = HeatCards(number, card, steady, start, period, first, direct, ramped, acting, amplitudes)
+            found.append(made)
+        start += period
     return found
+
+
+def procedure_of(group: Sequence[Card]) -> Card:
+    """Return the card of a step that says what is solved."""
+    for card in group:
+        if card.name in HEAT or card.name == "STATIC":
+            return card
+    raise group[0].error("needs *HEAT TRANSFER, *STATIC or both coupled: nothing else is solved here")
 
 
 def _at_nodes(card: Card, mesh: DeckMesh, by: int) -> Iterator[Acting]:

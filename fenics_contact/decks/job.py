@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.files import hidden_folder
 from fenics_contact._equilibrium.steps import LoadSequence
-from fenics_contact.decks.deck import Deck, read_deck
+from fenics_contact.decks.deck import read_deck
 from fenics_contact.decks.heat import HeatDeck, conducts, read_heat_deck
 from fenics_contact.decks.heat_results import HeatResults
 from fenics_contact.decks.results import DeckResults, exponential
@@ -20,7 +20,6 @@ from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.heat.state import HeatState
 from fenics_contact.output.files import OutputError, write_text
 from fenics_contact.output.frd import add_on_first, writing
-from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -112,18 +111,21 @@ def run_job(
     with together(comm):
         if comm.rank == 0:
             _clear(given, list(files.values()))
-    results: DeckResults
-    increments: Iterator[tuple[Any, Increment]]
     if on_root_then_bcast(comm, lambda: conducts(given)):
         heat = read_heat_deck(given, comm)
-        results, increments = HeatResults(heat.frame), _of_heat(heat, comm, settings)
+        results: DeckResults = HeatResults(heat.frame)
+        increments = _of_heat(heat, comm, settings, note)
     else:
-        deck = read_deck(given, comm)
-        results, increments = DeckResults(deck), _of_statics(deck, comm, settings)
-    for words in (*results.deck.notes, *results.notes):
-        note(words)
+        results = DeckResults(read_deck(given, comm))
+        increments = _of_statics(results, comm, settings, list[Increment]())
+    _note(results, note)
     _solve(increments, results, comm, files, watch)
     return list(files.values())
+
+
+def _note(results: DeckResults, note: Callable[[str], None]) -> None:
+    for words in (*results.deck.notes, *results.notes):
+        note(words)
 
 
 def _clear(deck: Path, files: list[Path]) -> None:
@@ -141,28 +143,52 @@ def _clear(deck: Path, files: list[Path]) -> None:
         ) from error
 
 
-def _of_statics(deck: Deck, comm: MPI.Comm, settings: dict[str, Any]) -> Iterator[tuple[State, Increment]]:
-    """Yield the states of all increments as they are solved. Collective."""
-    sequence, solved = LoadSequence(deck.problem(comm, **settings), count=len(deck.steps)), list[Increment]()
+#: Results, the state of an increment, its step among those of the results, from 0, and the increment.
+Solved: TypeAlias = Iterator[tuple[DeckResults, Any, int, Increment]]
+
+
+def _of_statics(
+    results: DeckResults,
+    comm: MPI.Comm,
+    settings: dict[str, Any],
+    solved: list[Increment],
+    of: Sequence[tuple[int, float]] = (),
+) -> Solved:
+    """Yield the states of all increments as they are solved. Collective.
+
+    `solved`: those before; `of`: numbers of the steps in the deck, and time of others before each.
+    """
+    deck = results.deck
+    sequence, start = LoadSequence(deck.problem(comm, **settings), count=len(deck.steps)), len(solved)
     for step, load in zip(deck.step_of, deck.steps, strict=True):
         state = sequence.advance(load)
-        solved.append(_increment(deck, state, step, solved))
-        yield state, solved[-1]
+        number, shift = of[step] if of else (step, 0.0)
+        time = shift + (float(len(solved) - start + 1) if load.time is None else float(load.time))
+        residual, closed = float(state.solution.natural_residual), int((state.contact.status != 0).sum())
+        solved.append(_increment(number, time, int(state.counts["solver_steps"]), residual, closed, solved))
+        yield results, state, step, solved[-1]
     sequence.finish()
 
 
-def _of_heat(
-    deck: HeatDeck, comm: MPI.Comm, settings: dict[str, Any]
-) -> Iterator[tuple[HeatState, Increment]]:
-    """Yield temperatures at the ends of all steps as they are solved. Collective."""
-    for number, ((step, _), state) in enumerate(zip(deck.steps, deck.states(comm, **settings), strict=True)):
-        length, residual = step.period, float(state.solution.natural_residual)
-        end = step.start + length
-        yield state, Increment(number + 1, 1, state.iterations, end, length, length, residual, 0)
+def _of_heat(deck: HeatDeck, comm: MPI.Comm, settings: dict[str, Any], note: Callable[[str], None]) -> Solved:
+    """Yield the temperatures of all increments as they are solved, then what they do. Collective."""
+    solved, results, ends = list[Increment](), HeatResults(deck.frame), dict[int, HeatState]()
+    for step, time, state in deck.increments(comm):
+        cards, residual = deck.steps[step][0], float(state.solution.natural_residual)
+        end = cards.start + time
+        solved.append(_increment(cards.number, end, state.iterations, residual, 0, solved))
+        ends[step] = state
+        yield results, state, cards.number, solved[-1]
+    if deck.moving:
+        statics = DeckResults(deck.statics(list(ends.values())))
+        _note(statics, note)
+        alone = [cards for cards, _ in deck.steps if cards.number not in deck.moving]
+        of = [(n, sum(cards.period for cards in alone if cards.number < n)) for n in deck.moving]
+        yield from _of_statics(statics, comm, settings, solved, of)
 
 
 def _solve(
-    increments: Iterator[tuple[Any, Increment]],
+    increments: Solved,
     results: DeckResults,
     comm: MPI.Comm,
     files: dict[str, Path],
@@ -175,7 +201,7 @@ def _solve(
         writer = stack.enter_context(writing(comm, files[".frd"], results.written, materials))
         while True:
             try:
-                state, last = next(increments)
+                own, state, step, last = next(increments)
             except StopIteration:
                 break
             except Exception as error:
@@ -184,9 +210,8 @@ def _solve(
                 failures.append(error)
                 break
             solved.append(last)
-            printed.append(results.printout(state, last.step - 1, last.time))
-            fields = results.nodal(state, last.step - 1)
-            add_on_first(comm, writer, fields, last.time, last.step, last.number)
+            printed.append(own.printout(state, step, last.time))
+            add_on_first(comm, writer, own.nodal(state, step), last.time, last.step, last.number)
             _write_lines(comm, files, solved)
             watch(last)
     with together(comm):
@@ -196,24 +221,14 @@ def _solve(
         raise failure
 
 
-def _increment(deck: Deck, state: State, step: int, before: list[Increment]) -> Increment:
-    """Return the increment that ends with a state."""
-    same = [each for each in before if each.step == step + 1]
-    load = deck.steps[len(before)]
-    time = float(len(before) + 1) if load.time is None else float(load.time)
-    start = next((each.time for each in reversed(before) if each.step <= step), 0.0)
-    last = before[-1].time if before else 0.0
-    contact = state.contact
-    return Increment(
-        step + 1,
-        len(same) + 1,
-        int(state.counts["solver_steps"]),
-        time,
-        time - start,
-        time - last,
-        float(state.solution.natural_residual),
-        int((contact.status != 0).sum()),
-    )
+def _increment(
+    step: int, time: float, iterations: int, residual: float, contacts: int, before: list[Increment]
+) -> Increment:
+    """Return the increment that ends at a time since the first step."""
+    number = 1 + sum(each.step == step + 1 for each in before)
+    start = max((each.time for each in before if each.step <= step), default=0.0)
+    last = max((each.time for each in before if each.time < time), default=0.0)
+    return Increment(step + 1, number, iterations, time, time - start, time - last, residual, contacts)
 
 
 def _write_lines(comm: MPI.Comm, files: dict[str, Path], solved: list[Increment]) -> None:

@@ -89,18 +89,17 @@ PROCEDURES = {
     "UNCOUPLEDTEMPERATURE-DISPLACEMENT", "SUBSTRUCTUREGENERATE", "CRACKPROPAGATION", "FEASIBLEDIRECTION",
 }  # fmt: skip
 #: Procedures of steps that conduct heat.
-HEAT = {"HEATTRANSFER"}
+HEAT = {"HEATTRANSFER", "COUPLEDTEMPERATURE-DISPLACEMENT", "UNCOUPLEDTEMPERATURE-DISPLACEMENT"}
 #: Cards of the model that say how heat is conducted; others have no effect on it.
 HEAT_MODEL = MESH_CARDS | {
     "SOLIDSECTION", "MATERIAL", "ORIENTATION", "DISTRIBUTION", "INITIALCONDITIONS", "CONTACTPAIR",
     "SURFACEINTERACTION", "SURFACEBEHAVIOR", "TIE", "CYCLICSYMMETRYMODEL", "CONDUCTIVITY", "SPECIFICHEAT",
     "DENSITY",
 }  # fmt: skip
+#: Cards that are of heat alone.
+HEAT_ALONE = {"DFLUX", "FILM", "RADIATE", "CFLUX", "GAPCONDUCTANCE"}
 #: Cards of steps that conduct heat, and of what they have.
-HEAT_CARDS = HEAT | {
-    "HEADING", "STEP", "ENDSTEP", "BOUNDARY", "AMPLITUDE", "DFLUX", "FILM", "RADIATE", "CFLUX",
-    "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
-}  # fmt: skip
+HEAT_CARDS = HEAT | HEAT_ALONE | {"HEADING", "STEP", "ENDSTEP", "BOUNDARY", "AMPLITUDE", "PHYSICALCONSTANTS"}
 #: Parameters of the cards that are read; any other one is refused.
 PARAMETERS: dict[str, set[str]] = {
     "NODE": {"NSET", "SYSTEM"},
@@ -152,7 +151,7 @@ PARAMETERS: dict[str, set[str]] = {
     "DLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
     "DSLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "CONSTANTRESULTANT", "FOLLOWER"},
     "TEMPERATURE": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "LINTEMP"},
-    "HEATTRANSFER": {"STEADYSTATE", "DIRECT", "SOLVER", "DELTMX", "TIMERESET", "END", "MXDEM"},
+    **{name: {"STEADYSTATE", "DIRECT", "SOLVER", "DELTMX", "TIMERESET", "END", "MXDEM"} for name in HEAT},
     "CONDUCTIVITY": {"TYPE"},
     "SPECIFICHEAT": set(),
     "GAPCONDUCTANCE": {"PRESSURE"},
@@ -173,8 +172,9 @@ STRUCTURES = {
     "CREEP": "creep is not solved here: it goes on in time",
     **{
         name: "heat is conducted in decks with *HEAT TRANSFER: give temperatures by *TEMPERATURE"
-        for name in ("FILM", "RADIATE", "DFLUX", "CFLUX", "GAPCONDUCTANCE")
+        for name in sorted(HEAT_ALONE)
     },
+    "GAPHEATGENERATION": "heat of friction is not read: give it by FrictionHeat in Python",
 }
 
 

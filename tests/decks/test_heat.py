@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.decks import DeckError, HeatDeck, Increment, read_deck, read_heat_deck, run_job
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.heat import HeatState
 from fenics_contact.mesh import quadratic
@@ -221,8 +222,8 @@ def test_decks_of_statics_name_what_conducts(tmp_path: Path) -> None:
         read_deck(deck(tmp_path, BAR + static))
     with pytest.raises(DeckError, match="read_heat_deck"):
         read_deck(deck(tmp_path, BAR + steady(COLD)))
-    with pytest.raises(DeckError, match=r"all steps must be \*HEAT TRANSFER"):
-        read_heat_deck(deck(tmp_path, BAR + steady(COLD) + "*STEP\n*STATIC\n*END STEP\n"))
+    with pytest.raises(DeckError, match=r"needs \*HEAT TRANSFER, \*STATIC or both coupled"):
+        read_heat_deck(deck(tmp_path, BAR + steady(COLD) + "*STEP\n*END STEP\n"))
 
 
 def test_jobs_write_temperatures_fluxes_and_heat_of_nodes(tmp_path: Path) -> None:
@@ -264,3 +265,55 @@ def test_heat_of_nodes_is_conserved_in_curved_cells_and_rings(tmp_path: Path) ->
     total = float(path.with_suffix(".dat").read_text().split()[-1])
     # A sector of two degrees, as CalculiX has it.
     assert total == pytest.approx(2.0 * np.pi * 0.4 * 40.0 / np.log(5.0) / 180.0, rel=1e-3)
+
+
+START = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nBAR_ALL, 20.\n"
+ALL = "*NSET, NSET=BAR_ALL, ELSET=BAR\n"
+GROWING = "*AMPLITUDE, NAME=GROWING\n0., 0., 2., 1.\n"
+
+
+def test_what_changes_in_time_needs_temperatures_at_its_start(tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match=r"add \*INITIAL CONDITIONS, TYPE=TEMPERATURE"):
+        read_heat_deck(deck(tmp_path, BAR + "*STEP\n*HEAT TRANSFER\n0.5, 2.\n*END STEP\n"))
+
+
+EXPANDS = MESH + COPPER + "*ELASTIC\n1.E5, 0.\n*EXPANSION\n1.E-5\n" + SECTION + ALL + START
+CLAMPED = "*BOUNDARY\nBAR_X0, 1, 1\nBAR_Y0, 2, 2\nBAR_Z0, 3, 3\n"
+WARM = "*BOUNDARY\nBAR_X0, 11, 11, 20.\nBAR_X1, 11, 11, 60.\n"
+
+
+@pytest.mark.parametrize(
+    "steps",
+    [
+        f"*STEP\n*UNCOUPLED TEMPERATURE-DISPLACEMENT, STEADY STATE\n{CLAMPED}{WARM}*END STEP\n",
+        f"*STEP\n*COUPLED TEMPERATURE-DISPLACEMENT, STEADY STATE\n{CLAMPED}{WARM}*END STEP\n",
+        steady(WARM) + f"*STEP\n*STATIC\n{CLAMPED}*END STEP\n",
+    ],
+)
+def test_bodies_move_at_the_temperatures_that_were_found(tmp_path: Path, steps: str) -> None:
+    asked = "*NODE PRINT, NSET=BAR_X1\nNT, U\n*END STEP\n"
+    path = deck(tmp_path, EXPANDS + steps.replace("*END STEP\n", asked))
+    seen: list[Increment] = []
+    run_job(path, MPI.COMM_SELF, watch=seen.append)
+    last = float(steps.count("*STEP"))
+    assert [each.time for each in seen] == [1.0, last]
+    lines = path.with_suffix(".dat").read_text().splitlines()
+    start = lines.index(f" displacements (vx,vy,vz) for set BAR_X1 and time  0.{last:.0f}000000E+01") + 2
+    moved = np.array([row.split()[1] for row in lines[start : start + 4]], dtype=float)
+    assert moved.mean() == pytest.approx(4.0 * 1e-5 * 20.0, rel=1e-5)
+    assert {each.kind for each in read_frd(path.with_suffix(".frd")).blocks} >= {"NDTEMP", "DISP"}
+    found = read_heat_deck(path)
+    (state,) = found.statics(found.solve(MPI.COMM_SELF)).solve(MPI.COMM_SELF)
+    end = found.bodies["BAR"].mesh.points[:, 0] > 4.0 - 1e-9
+    assert state.gather_displacement("BAR")[end, 0].mean() == pytest.approx(8e-4, rel=1e-5)
+
+
+def test_pressures_that_act_on_heat_are_refused(tmp_path: Path) -> None:
+    coupled = f"*STEP\n*COUPLED TEMPERATURE-DISPLACEMENT, STEADY STATE\n{ENDS}*END STEP\n"
+    with pytest.raises(DeckError, match="pressures of mechanics act on heat: solve both by solve_heated"):
+        read_heat_deck(deck(tmp_path, TWO + DRY + "*GAP CONDUCTANCE\n0.1\n" + PAIR + coupled))
+    with pytest.raises(DeckError, match="heat of friction is not read: give it by FrictionHeat in Python"):
+        read_heat_deck(deck(tmp_path, TWO + DRY + "*GAP HEAT GENERATION\n1.\n" + PAIR + coupled))
+    found = read_heat_deck(deck(tmp_path, BAR + steady(COLD)))
+    with pytest.raises(InvalidInputError, match="has no step in which bodies move"):
+        found.statics(found.solve(MPI.COMM_SELF))
