@@ -16,7 +16,6 @@ from fenics_contact._base.checkpoint import Checkpoint, interruptible
 from fenics_contact._base.display import counted
 from fenics_contact._base.progress import is_visible, show_progress
 from fenics_contact._cli.console import Console, console_of, facts, write_stderr
-from fenics_contact._scene.plan import Plan
 from fenics_contact._scene_file.entry import read_scene_file
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
@@ -201,7 +200,7 @@ def forget(console: Console, checkpoint: Checkpoint | None) -> None:
 
 def plan_of_states(file: SceneFile) -> dict[str, str]:
     """Return what is solved, name -> words. Collective."""
-    rows = _rows(file.scene.plan(file.partitions))
+    rows = {name: words for plan in file.plans for name, words in _rows(plan).items()}
     if file.steps:
         rows["load steps"] = str(len(file.steps))
     halvings = file.document.solver.halvings
@@ -222,7 +221,7 @@ def plan_of_design(file: SceneFile) -> dict[str, str]:
     return rows | {"accuracy": f"objective{asked.in_words.removeprefix(str(asked.quantity))}"}
 
 
-def _rows(plan: Plan) -> dict[str, str]:
+def _rows(plan: object) -> dict[str, str]:
     return {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
 
 

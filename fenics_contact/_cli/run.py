@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import singledispatch
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
 
 from fenics_contact._adaptive.levels import AccurateResult, Level
-from fenics_contact._base.display import DerivedUnits
+from fenics_contact._base.display import DerivedUnits, counted
 from fenics_contact._cli.console import (
     Console,
     ExitCode,
@@ -24,7 +25,7 @@ from fenics_contact._cli.console import (
 from fenics_contact._cli.options import checkpoint_of, forget, plan_of_states, resumable, scene_command
 from fenics_contact._cli.view import Gallery, can_draw, draw_meshes, draw_state
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene_file.heat import HeatFile
+from fenics_contact._scene_file.heat import HeatedFile, HeatFile
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import LoadStepError
 from fenics_contact.output.files import only_run_in
@@ -35,6 +36,9 @@ from fenics_contact.output.tables import StepTable, step_row, write_contact_tabl
 from fenics_contact.results.deformed_state import DeformedState
 from fenics_contact.results.on_bodies import OnBodies
 from fenics_contact.results.state import State
+
+if TYPE_CHECKING:
+    from fenics_contact.heat.state import HeatState
 
 #: Largest number of load steps with maps of the status.
 MAPS = 6
@@ -86,12 +90,29 @@ def _computed(file: SceneFile, console: Console, resume: bool | None) -> Found:
 @_computed.register
 def _(file: HeatFile, console: Console, resume: bool | None) -> Found:
     state: Any = file.solve()
-    console.write(f"{state}\n{state.balance}")
-    _write_fields(file, state)
-    if "csv" in file.document.output.files:
-        write_heat_balance([state], file.folder / "steps.csv")
-    write_result(state, file.folder, more=_origin(file))
+    _keep_heat(console, file, state, file.folder)
     return Found({file.title: state})
+
+
+@_computed.register
+def _(file: HeatedFile, console: Console, resume: bool | None) -> Found:
+    state = file.solve()
+    console.write(
+        f"heat and mechanics agree after {counted(state.passes, 'pass', 'passes')}, from {state.start}"
+    )
+    _show(console, file, state.mechanics)
+    _write(file, state.mechanics)
+    _keep_heat(console, file, state.heat, file.folder / "heat")
+    return Found({file.title: state.mechanics})
+
+
+def _keep_heat(console: Console, file: SceneFile, state: HeatState, folder: Path) -> None:
+    """Print temperatures and where heat comes from, and write them. Collective."""
+    console.write(f"{state}\n{state.balance}")
+    _write_fields(file, state, folder)
+    if "csv" in file.document.output.files:
+        write_heat_balance([state], folder / "steps.csv")
+    write_result(state, folder, more=_origin(file))
 
 
 run = scene_command(_run, plan=plan_of_states, check=SceneFile.check_accuracy, accurate=("accuracy", "of"))
@@ -136,7 +157,7 @@ def table_of_levels(console: Console) -> Callable[[Level], None]:
 
 def _write(file: SceneFile, state: State, accurate: AccurateResult | None = None) -> None:
     """Write the files of a scene without load steps. Collective."""
-    _write_fields(file, state)
+    _write_fields(file, state, file.folder)
     if "csv" in file.document.output.files:
         StepTable(file.folder / "steps.csv", file.comm).add(state, file.title)
     file.write_tables(state)
@@ -144,15 +165,15 @@ def _write(file: SceneFile, state: State, accurate: AccurateResult | None = None
     write_result(state, file.folder, more=_origin(file), errors=known, accuracy=accurate)
 
 
-def _write_fields(file: SceneFile, state: OnBodies) -> None:
+def _write_fields(file: SceneFile, state: OnBodies, folder: Path) -> None:
     """Write fields and contact points. Collective."""
     kinds = file.document.output.files
     if "vtu" in kinds:
-        write_vtu(state, file.folder)
+        write_vtu(state, folder)
     if "xdmf" in kinds:
-        write_xdmf(state, file.folder / "state.xdmf")
-    if "csv" in kinds and file.scene.contacts:
-        write_contact_table(state, file.folder / "contact.csv")
+        write_xdmf(state, folder / "state.xdmf")
+    if "csv" in kinds and state.geometry.contacts:
+        write_contact_table(state, folder / "contact.csv")
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,17 +12,6 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from fenics_contact._scene_file.reading import SceneFile
-
-
-#: Module and class that read files with a section, by its key; loaded for these files alone.
-SECTIONS = {"heat": ("fenics_contact._scene_file.heat", "HeatFile")}
-
-
-def _kind(data: Mapping[str, Any]) -> type[SceneFile]:
-    known = ("fenics_contact._scene_file.reading", "SceneFile")
-    module, name = next((own for key, own in SECTIONS.items() if key in data), known)
-    found: type[SceneFile] = getattr(import_module(module), name)
-    return found
 
 
 @naming_arguments
@@ -56,12 +44,14 @@ def read_scene_file(
         >>> state = file.solve()  # doctest: +SKIP
     """
     from fenics_contact._scene_file.document import refused_python
-    from fenics_contact._scene_file.reading import source_of
+    from fenics_contact._scene_file.heat import HeatedFile, HeatFile
+    from fenics_contact._scene_file.reading import SceneFile, source_of
     from fenics_contact._scene_file.source import SceneFileError
     from fenics_contact._scene_file.validation import validated, wrong_names
 
     source = source_of(scene, comm).with_overrides(overrides)
-    kind = _kind(source.data)
+    of_heat: type[SceneFile] = HeatedFile if "materials" in source.data else HeatFile
+    kind = of_heat if "heat" in source.data else SceneFile
     document = validated(source, kind.documents())
     wrong = wrong_names(source, document) or ([] if python else refused_python(source, document))
     if wrong:

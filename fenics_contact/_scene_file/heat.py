@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,40 +13,56 @@ from fenics_contact._scene_file.reading import Builder, SceneFile, made_of
 from fenics_contact.errors import together
 
 if TYPE_CHECKING:
-    from fenics_contact._scene_file.heat_tables import HeatDocument
-    from fenics_contact.heat.scene import HeatScene
+    from fenics_contact._scene.scene import Scene
+    from fenics_contact._scene_file.bodies import Shaped
+    from fenics_contact._scene_file.heat_tables import HeatDocument, HeatedDocument
+    from fenics_contact.heat.coupled import HeatedState
+    from fenics_contact.heat.scene import ConductingBody, HeatScene
     from fenics_contact.heat.state import HeatState
 
 
 class _HeatBuilder(Builder):
     """Builds what conducts, part by part."""
 
-    def heat(self) -> HeatScene:
-        """Return the scene of heat. Collective."""
-        from fenics_contact.heat.scene import ConductingBody, HeatScene
+    _document: HeatDocument
 
-        document: Any = self._document
-        shapes, bodies, materials = self.shapes(), dict[str, Any](), dict[str, Any]()
-        for name, each in document.heat.materials.items():
+    def conductors(self) -> dict[str, Any]:
+        """Return what bodies conduct with, by name."""
+        materials = dict[str, Any]()
+        for name, each in self._document.heat.materials.items():
             with self._at("heat", "materials", name):
                 materials[name] = each.made()
         self._check()
-        for name, part in document.bodies.items():
+        bodies = self._document.bodies.items()
+        return {name: made_of(body.heat.material, materials) for name, body in bodies if body.heat}
+
+    def bodies_alone(self) -> dict[str, ConductingBody]:
+        """Return the bodies without mechanics. Collective."""
+        from fenics_contact.heat.scene import ConductingBody
+
+        shapes, made, found = self.shapes(), self.conductors(), dict[str, ConductingBody]()
+        parts: Mapping[str, Any] = self._document.bodies
+        for name, part in parts.items():
             with self._at("bodies", name):
-                mesh, material = self._part_of(name, part, shapes[part.mesh]).mesh, part.heat.material
-                of = made_of(material, materials)
-                bodies[name] = ConductingBody(mesh, of, part.axisymmetric, part.heat.thickness)
+                mesh, own = self._part_of(name, part, shapes[part.mesh]).mesh, part.heat
+                found[name] = ConductingBody(mesh, made[name], part.axisymmetric, own.thickness)
         self._check()
+        return found
+
+    def parts(self, bodies: Mapping[str, Any]) -> dict[str, list[Any]]:
+        """Return what acts on bodies and joins them."""
+        from fenics_contact.heat.scene import HeatScene
+
         self._check_surfaces(bodies)
         found: dict[str, list[Any]] = {"held": [], "loads": [], "contacts": [], "ties": []}
         for key, made in found.items():
-            for number, each in enumerate(getattr(document.heat, key)):
+            for number, each in enumerate(getattr(self._document.heat, key)):
                 with self._at("heat", key, number):
                     one: Any = {key: [each.made()]}
                     HeatScene(bodies, **one)  # rejects what does not suit the bodies
                     made += one[key]
         self._check()
-        return HeatScene(bodies, **found)
+        return {key: made for key, made in found.items() if made}
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +82,11 @@ class HeatFile(SceneFile):
     @cached_property
     def scene(self) -> HeatScene:  # type: ignore[override]
         """The scene. Collective on first use."""
-        return _HeatBuilder(self.source, self._complete, self.comm).heat()
+        from fenics_contact.heat.scene import HeatScene
+
+        builder = _HeatBuilder(self.source, self._complete, self.comm)
+        bodies = builder.bodies_alone()
+        return HeatScene(bodies, **builder.parts(bodies))
 
     @cached_property
     def partitions(self) -> dict[str, np.ndarray]:
@@ -75,13 +96,53 @@ class HeatFile(SceneFile):
             return self.document.solver.cut(field, self.comm.size)
 
     def solve(self) -> HeatState:  # type: ignore[override]
-        """Compute the temperatures. Collective.
-
-        Raises:
-            InfeasibleError: If nothing gives a temperature to a body.
-            ConvergenceError: If a solver does not reach its tolerance.
-        """
+        """Compute the temperatures, see `solve_heat`. Collective."""
         from fenics_contact.heat.problem import solve_heat
 
         with self._at("heat"):
             return solve_heat(self.scene, self.comm, partitions=self.partitions, **self.document.solver.fixed)
+
+
+@dataclass(frozen=True, eq=False)
+class HeatedFile(SceneFile):
+    """A scene file of mechanics and heat; its scene is that of mechanics."""
+
+    document: HeatedDocument
+
+    @classmethod
+    def documents(cls) -> type[HeatedDocument]:
+        """Return the form of its data."""
+        from fenics_contact._scene_file.heat_tables import HeatedDocument
+
+        return HeatedDocument
+
+    @cached_property
+    def _built(self) -> tuple[Scene, dict[str, Shaped]]:
+        builder = Builder(self.source, self._complete.model_copy(update={"heat": None}), self.comm)
+        bodies, shapes = builder.bodies()
+        return builder.scene(bodies), shapes
+
+    @cached_property
+    def heat(self) -> HeatScene:
+        """The heat of its bodies. Collective on first use."""
+        from fenics_contact.heat.scene import HeatScene
+
+        alone = type(self._complete).model_construct(heat=self._complete.heat, bodies=self._complete.bodies)
+        builder = _HeatBuilder(self.source, alone, self.comm)
+        made = builder.conductors()
+        with self._at("heat"):
+            bodies = HeatScene.on(self.scene, made).bodies
+        return HeatScene.on(self.scene, made, **builder.parts(bodies))
+
+    @property
+    def plans(self) -> tuple[object, ...]:
+        """What will be built, as text. Collective on first use."""
+        return *super().plans, self.heat.plan(self.partitions)
+
+    def solve(self) -> HeatedState:  # type: ignore[override]
+        """Compute temperatures and deformation that depend on each other, see `solve_heated`. Collective."""
+        from fenics_contact.heat.coupled import solve_heated
+
+        options = {**self.document.solver.fixed, **self.document.heat.coupling}
+        with self._at("heat"):
+            return solve_heated(self.scene, self.heat, self.comm, partitions=self.partitions, **options)

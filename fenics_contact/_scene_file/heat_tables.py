@@ -16,6 +16,7 @@ from fenics_contact._scene_file.part import IN_FILES, Part, built, keys_of, tabl
 from fenics_contact._scene_file.source import Path
 from fenics_contact._scene_file.values import Line, Numbers, Read, ScalarField, either, field_or, one_of
 from fenics_contact.heat import conductance, parts
+from fenics_contact.heat.friction import FrictionHeat
 from fenics_contact.heat.properties import Conductor, TemperatureTable
 from fenics_contact.heat.scene import ThermalContact
 
@@ -48,10 +49,15 @@ class ConductingPart(document.MadeOf):
 
 
 class HeatedPart(document.BodyPart):
+    """A body: a mesh and what it is made of, for mechanics and heat."""
+
+    heat: ConductingPart | None = Field(None, description="what it conducts with")
+
+
+class ConductingAlonePart(HeatedPart):
     """A body: a mesh and what it is made of, for mechanics, heat or both."""
 
     material: document.Materials | None = Field(None, description="what it deforms with")  # type: ignore[assignment]
-    heat: ConductingPart | None = Field(None, description="what it conducts with")
 
 
 @keys_of(parts.HeldTemperature)
@@ -84,7 +90,10 @@ _OneLaw: TypeAlias = Annotated[Any, one_of("law", *LAWS)]
 _Laws = either(list, Annotated[list[_OneLaw], Field(min_length=1)], either(dict, _OneLaw, PositiveFloat))
 
 
-@keys_of(ThermalContact, without={"friction"})
+FrictionHeatPart: Any = table_of(FrictionHeat, coefficient=(field_or(_Table, _KEYS), Field(0.0)))
+
+
+@keys_of(ThermalContact)
 class ThermalContactPart(Part):
     """Two surfaces between which heat passes."""
 
@@ -94,6 +103,7 @@ class ThermalContactPart(Part):
         description="a number, a law, or a list of laws that add up"
     )
     temperature: ScalarField | None = Field(None, description="of an obstacle, in degrees")
+    friction: FrictionHeatPart | None = Field(None, description="heat that arises where the surfaces slide")
 
     def made(self, **other: Any) -> Any:
         """Build the contact."""
@@ -112,6 +122,18 @@ class HeatPart(Part):
     loads: list[Annotated[Any, one_of("kind", *LOADS)]] = Field([], description="what heats and cools bodies")
     contacts: list[ThermalContactPart] = Field([], description="surfaces between which heat passes")
     ties: list[TiePart] = Field([], description="pairs of surfaces with the same temperature")
+    stress_free: either(dict, dict[str, float], float) = Field(  # type: ignore[valid-type]
+        0.0, description="temperature at which bodies are free of thermal strain, or by body, in degrees"
+    )
+    duration: PositiveFloat | None = Field(
+        None,
+        description="time in which loads act, for heat of friction; by default so long that it is none",
+    )
+
+    @property
+    def coupling(self) -> dict[str, Any]:
+        """What is given for mechanics and heat together."""
+        return {name: getattr(self, name) for name in self.model_fields_set & {"stress_free", "duration"}}
 
 
 class HeatOutputPart(document.OutputPart):
@@ -125,7 +147,7 @@ class HeatDocument(document.Document):
     """A scene of fenics_contact with heat."""
 
     materials: dict[str, AnyMaterial] = Field({}, description="materials by name")
-    bodies: dict[str, HeatedPart] = Field(min_length=1, description="bodies by name")  # type: ignore[assignment]
+    bodies: dict[str, ConductingAlonePart] = Field(min_length=1, description="bodies by name")  # type: ignore[assignment]
     output: HeatOutputPart = Field(HeatOutputPart(), description="what is written, and where")
     heat: HeatPart = Field(description="heat of the bodies")  # type: ignore[assignment]
 
@@ -144,6 +166,24 @@ class HeatDocument(document.Document):
             if body.heat is None:
                 yield ("bodies", name), "must have 'heat', what it conducts with: this file has heat alone"
         yield from ((path, "is of mechanics, this file has heat alone: leave it out") for path in others)
+
+
+class HeatedDocument(HeatDocument):
+    """A scene of fenics_contact with mechanics and heat."""
+
+    materials: dict[str, AnyMaterial] = Field(min_length=1, description="materials by name")
+    bodies: dict[str, HeatedPart] = Field(min_length=1, description="bodies by name")  # type: ignore[assignment]
+    output: document.OutputPart = Field(document.OutputPart(), description="what is written, and where")
+
+    def misfits(self) -> Iterator[tuple[Path, str]]:
+        """Yield keys that do not go with heat."""
+        others = self.model_fields_set & {"steps", "accuracy", "design", "automatic_contact"}
+        paths: list[Path] = [(key,) for key in others]
+        paths += [("solver", key) for key in self.solver.model_fields_set - {"subdomains", "tolerance"}]
+        for name, body in self.bodies.items():
+            if body.heat and "thickness" in body.heat.model_fields_set:
+                yield ("bodies", name, "heat", "thickness"), "is that of its mechanics: leave it out"
+        yield from ((path, "does not go with [heat] and [materials]: leave it out") for path in paths)
 
 
 _OF_CONDUCTING = {"mesh", "part", "axisymmetric", "heat"}

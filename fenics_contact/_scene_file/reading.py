@@ -434,6 +434,11 @@ class SceneFile:
             return self.document.solver.cut(scene, self.comm.size)
 
     @property
+    def plans(self) -> tuple[object, ...]:
+        """What will be built, as text. Collective on first use."""
+        return (self.scene.plan(self.partitions),)
+
+    @property
     def problem(self) -> ContactProblem:
         """The scene on its first meshes with the solver of the file, unsolved. Collective on first use."""
         solver = self.document.solver

@@ -33,6 +33,7 @@ from fenics_contact.heat.acceleration import Anderson
 from fenics_contact.heat.assembly import Rate
 from fenics_contact.heat.friction import FrictionHeat
 from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.plausible import odd_power, warn_of
 from fenics_contact.heat.problem import GivenContact, HeatProblem, as_given
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.heat.state import HeatState
@@ -339,6 +340,7 @@ def solve_heated(
         old, words = before.heat.temperature, "those before the step"
         rate = Rate(1.0 / duration, before.heat.values, problems[1].no_rate.history)
     else:
+        warn_of(odd_power(scene, heat), comm)
         problems = (
             ContactProblem(scene, comm, partitions=partitions, tolerance=tolerance),
             HeatProblem(heat, comm, partitions=partitions),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, RigidPlane, Scene, Surface, Tie
+from fenics_contact import Body, RigidPlane, Scene, Support, Surface, Tie
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.heat import (
@@ -25,6 +25,7 @@ from fenics_contact.heat import (
     Radiation,
     ThermalContact,
     solve_heat,
+    solve_heated,
 )
 from fenics_contact.heat.conductance import Touch
 from fenics_contact.heat.plausible import odd_power, odd_values
@@ -127,7 +128,9 @@ def test_the_constant_of_radiation_in_metres_is_warned_of() -> None:
     assert not list(odd_values(bars(1, 0.1, 1.0, loads=warm)))
 
 
-def test_power_in_watts_does_not_go_with_moduli_in_newtons_and_millimetres() -> None:
+def test_power_in_watts_does_not_go_with_moduli_in_newtons_and_millimetres(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     heat = bars(2, 0.045)
     steel, soft = PlaneStrain(2.1e5, 0.3), PlaneStrain(5.0, 0.3)
     scene = Scene({"a": Body(heat.bodies["a"].mesh, steel), "b": Body(heat.bodies["b"].mesh, soft)})
@@ -135,6 +138,10 @@ def test_power_in_watts_does_not_go_with_moduli_in_newtons_and_millimetres() -> 
     assert "body 'a'? a conductivity of 0.045 is that of a metal in W/(mm K)" in words
     assert words.endswith("power is then in N mm/s and the conductivity 45")
     assert not list(odd_power(scene, bars(2, 45.0)))
+    with caplog.at_level(logging.WARNING, logger="fenics_contact"):
+        heat, held = bars(1, 0.045, held=[HELD]), [Support("a", "x0")]
+        solve_heated(Scene({"a": scene.bodies["a"]}, held), heat, MPI.COMM_SELF)
+    assert caplog.messages == [words]
 
 
 def plate(x: float = 0.0) -> ConductingBody:

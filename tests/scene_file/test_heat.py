@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import RigidPlane, Surface, Tie, read_scene_file
+from fenics_contact import Body, ContactPair, RigidPlane, Scene, Support, Surface, Tie, read_scene_file
 from fenics_contact._cli.app import main
 from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact.errors import InfeasibleError
@@ -20,6 +20,7 @@ from fenics_contact.heat import (
     ConductingBody,
     Conductor,
     Convection,
+    FrictionHeat,
     GapConductance,
     GapRadiation,
     HeatAtNodes,
@@ -32,8 +33,10 @@ from fenics_contact.heat import (
     TemperatureTable,
     ThermalContact,
     solve_heat,
+    solve_heated,
 )
 from fenics_contact.heat.conductance import Touch
+from fenics_contact.materials import PlaneStrain
 from tests.conftest import ROOT
 
 EXAMPLE = ROOT / "demos" / "scenes" / "chip_on_sink.toml"
@@ -189,6 +192,122 @@ def test_a_mistake_is_named_with_its_line(old: str, new: str, message: str, tmp_
     assert f"bars.toml, {message}" in str(error.value)
 
 
+#: Bars between walls, which warm until they touch.
+PRESSED = """\
+[meshes]
+a = { shape = "rectangle", lower = [0.0, 0.0], upper = [1.0, 1.0], counts = [2, 2] }
+b = { shape = "rectangle", lower = [1.001, 0.0], upper = [2.001, 1.0], counts = [2, 2] }
+
+[materials.steel]
+model = "plane_strain"
+young_modulus = 1e3
+poisson_ratio = 0.0
+thermal_expansion = 1e-4
+
+[heat]
+stress_free = 15.0
+materials.steel.conductivity = 2.0
+
+[bodies.a]
+mesh = "a"
+material = "steel"
+heat.material = "steel"
+
+[bodies.b]
+mesh = "b"
+material = "steel"
+heat.material = "steel"
+
+[[supports]]
+body = "a"
+surface = "x0"
+
+[[supports]]
+body = "b"
+surface = "x1"
+
+[[contacts]]
+slave = { body = "b", surface = "x0" }
+master = { body = "a", surface = "x1" }
+discretisation = "node"
+
+[[heat.held]]
+body = "a"
+surface = "x0"
+value = 20.0
+
+[[heat.loads]]
+kind = "convection"
+body = "b"
+surface = "y0"
+coefficient = 1.0
+ambient = 99.0
+
+[[heat.contacts]]
+slave = { body = "b", surface = "x0" }
+master = { body = "a", surface = "x1" }
+discretisation = "node"
+conductance = { law = "pressure", coefficient = 9.0, hardness = 50.0 }
+friction = { coefficient = 0.2, speed = 0.5 }
+"""
+
+
+def test_mechanics_and_heat_of_one_file_are_those_of_python(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bars.toml"
+    path.write_text(f"output = {{ folder = '{tmp_path}/out', files = ['vtu', 'csv'] }}\n{PRESSED}")
+    file: Any = read_scene_file(path, MPI.COMM_SELF)
+    steel = PlaneStrain(1e3, 0.0, thermal_expansion=1e-4)
+    ends = {"a": (0.0, 1.0), "b": (1.001, 2.001)}
+    scene = Scene(
+        {name: Body(rectangle((x, 0), (y, 1), (2, 2)), steel) for name, (x, y) in ends.items()},
+        [Support("a", "x0"), Support("b", "x1")],
+        contacts=[ContactPair(Surface("b", "x0"), Surface("a", "x1"), discretisation="node")],
+    )
+    friction, law = FrictionHeat(0.2, 0.5), PressureConductance(9.0, 50.0)
+    sides = Surface("b", "x0"), Surface("a", "x1")
+    heat = HeatScene.on(
+        scene, {"a": Conductor(2.0), "b": Conductor(2.0)}, held=[HeldTemperature("a", "x0", 20.0)],
+        loads=[Convection("b", "y0", 1.0, 99.0)],
+        contacts=[ThermalContact(*sides, law, discretisation="node", friction=friction)],
+    )  # fmt: skip
+    by_hand = solve_heated(scene, heat, MPI.COMM_SELF, stress_free=15.0)
+    state = file.solve()
+    np.testing.assert_allclose(state.heat.values, by_hand.heat.values, rtol=1e-9)
+    assert by_hand.mechanics.contact.normal_force.sum() > 1.0
+    assert main(MPI.COMM_SELF, ["run", str(path), "--no-pictures"]) == 0
+    said = capsys.readouterr().out
+    assert "pair 0" in said
+    assert "rows of heat" in said
+    assert "strain energy" in said
+    assert "HeldTemperature a x0" in said
+    for name in ("result.json", "contact.csv", "heat/result.json", "heat/contact.csv", "heat/steps.csv"):
+        assert (tmp_path / "out" / name).exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[materials.steel]", "[[steps]]\n[materials.steel]", "line 5: steps does not go with [heat]"),
+        ("[materials.steel]", "[solver]\nmethod = 'smalse'\n[materials.steel]", "line 6: solver.method"),
+        ('material = "steel"\nheat.material = "steel"\n\n[bodies.b]', 'heat.material = "steel"\n[bodies.b]',
+         "line 15: bodies.a must have 'material', got only mesh, heat"),
+        ('heat.material = "steel"\n\n[bodies.b]', 'heat = { material = "steel", thickness = 2 }\n[bodies.b]',
+         "line 18: bodies.a.heat.thickness is that of its mechanics: leave it out"),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_with_mechanics_and_heat_is_named(
+    old: str, new: str, message: str, tmp_path: Path
+) -> None:
+    assert PRESSED.count(old) == 1
+    path = tmp_path / "bars.toml"
+    path.write_text(PRESSED.replace(old, new))
+    with pytest.raises(SceneFileError) as error:
+        _ = read_scene_file(path, MPI.COMM_SELF)
+    assert message in str(error.value)
+
+
 def test_a_file_of_mechanics_knows_the_key_of_heat(tmp_path: Path) -> None:
     path = tmp_path / "bars.toml"
     path.write_text(BARS.replace("[heat.", "[haet.").replace("[[heat.", "[[haet."))
@@ -217,7 +336,7 @@ def test_the_command_solves_a_file(tmp_path: Path, capsys: pytest.CaptureFixture
 
 def test_files_without_heat_load_nothing_of_it(mpirun: Callable[..., str]) -> None:
     code = (
-        "import sys; import fenics_contact._cli.app; from fenics_contact import read_scene_file\n"
+        "import sys; from fenics_contact import read_scene_file\n"
         "from mpi4py import MPI\n"
         f"read_scene_file({str(EXAMPLE.with_name('two_blocks.toml'))!r}, MPI.COMM_SELF).scene.plan()\n"
         "sys.stdout.write(str([n for n in sys.modules if n.startswith('fenics_contact.heat')]))"
