@@ -173,7 +173,9 @@ class HeatedDocument(HeatDocument):
 
     materials: dict[str, AnyMaterial] = Field(min_length=1, description="materials by name")
     bodies: dict[str, HeatedPart] = Field(min_length=1, description="bodies by name")  # type: ignore[assignment]
-    output: document.OutputPart = Field(document.OutputPart(), description="what is written, and where")
+    output: document.OutputPart = Field(  # type: ignore[assignment]
+        document.OutputPart(), description="what is written, and where"
+    )
 
     def misfits(self) -> Iterator[tuple[Path, str]]:
         """Yield keys that do not go with heat."""

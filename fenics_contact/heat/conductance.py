@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from math import inf
 from typing import TypeAlias
 
 import numpy as np
@@ -53,6 +54,8 @@ class Conductance(ABC):
     by_temperature = False
     #: Whether it depends on pressures or gaps, which mechanics may change.
     by_contact = True
+    #: Temperatures must lie above it.
+    absolute_zero: float = -inf
 
     @abstractmethod
     def at(self, touch: Touch) -> np.ndarray:
@@ -97,6 +100,11 @@ class SummedConductance(Conductance):
     def by_contact(self) -> bool:  # type: ignore[override]
         """Whether one of them depends on pressures or gaps."""
         return any(each.by_contact for each in self.parts)
+
+    @property
+    def absolute_zero(self) -> float:  # type: ignore[override]
+        """The highest one of all."""
+        return max(each.absolute_zero for each in self.parts)
 
     def at(self, touch: Touch) -> np.ndarray:
         """Return the sum of all."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -47,6 +47,8 @@ class HeatPart(ABC):
     gives_temperature = False
     #: A temperature that it was given, not a number where it has none.
     level: Value = nan
+    #: Temperatures must lie above it.
+    absolute_zero: float = -inf
 
     def check(self, meshes: Mapping[str, BodyMesh]) -> None:
         """Reject a body or a place that is not there."""
@@ -306,7 +308,7 @@ class Convection(Film):
     def coefficients(
         self, points: np.ndarray, temperature: np.ndarray, ambient: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return h, and h again as its slope: tables hardly change within a step of the iteration."""
+        """Return h, and h + h' (T − T_a), or half of h where that is less."""
         given: Any = self.coefficient
         if self.is_linear:
             h = self._at(given, points)
@@ -315,9 +317,9 @@ class Convection(Film):
                     f"Convection.coefficient on {self.place} must not be negative, got {h.min():g}: correct "
                     "the function"
                 )
-        else:
-            h = given.at(temperature)
-        return h, h
+            return h, h
+        h = given.at(temperature)
+        return h, np.maximum(h + given.slope(temperature) * (temperature - ambient), 0.5 * h)
 
 
 #: Stefan and Boltzmann's constant in W/(m² K⁴).

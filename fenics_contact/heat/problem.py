@@ -22,7 +22,7 @@ from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.free_motions import free_motions
 from fenics_contact.feti.row_groups import Glued
 from fenics_contact.feti.torn import TornSystem, at_rest, numbered
-from fenics_contact.heat.acceleration import Anderson
+from fenics_contact.heat.acceleration import CautiousAnderson
 from fenics_contact.heat.assembly import Assembly, Heated, Rate
 from fenics_contact.heat.determined import require_agreement, require_temperatures
 from fenics_contact.heat.forms import HeatForms, Part
@@ -173,18 +173,26 @@ class _Iteration:
     rate: Rate
     given: GivenContact
 
-    def run(self, last: HeatState | None, most: int, settled: float = 1e-10) -> HeatState:
-        guess, anderson, products = self._first(last), Anderson(), 0
+    def run(
+        self, last: HeatState | None, most: int, settled: float = 1e-10, loosest: float = 1e-3
+    ) -> HeatState:
+        guess, anderson, products = self._first(last), CautiousAnderson(1 if self.scene.only_films_vary else 5), 0
+        full, linear, floor = self.problem.tolerance, self.scene.is_linear, self.scene.absolute_zero
+        tolerance = full if linear else max(full, loosest)
         for count in range(1, most + 1):
-            state = self._linear(guess, last, count, products)
+            state = self._linear(guess, last, tolerance, (count, products))
             products, last = state.products, state
             size = np.abs(state.values - self._level(state.values)).max()
-            change = np.abs(state.values - guess).max()
+            following = anderson.next(guess, state.values)
+            change = anderson.change
+            left = change * min(anderson.rate, 1.0)
             # Even temperatures change by nothing but what linear systems leave.
-            least = self.problem.tolerance * np.abs(state.values).max()
-            if self.scene.is_linear or change <= max(settled * size, least):
+            enough = max(settled * size, full * np.abs(state.values).max())
+            if tolerance <= full and (linear or left <= enough):
                 return state
-            guess = anderson.next(guess, state.values)
+            # What a step changes is known to a thousandth; the last system is solved in full.
+            tolerance = full if left <= enough else min(max(full, 1e-3 * change / size), loosest)
+            guess = np.maximum(following, guess - 0.7 * (guess - floor))
         raise ConvergenceError(
             f"temperatures do not settle, they change by {change:.2g} of {size:.2g} after {most} systems: "
             "start from a state nearby, or make steps of the loads"
@@ -202,7 +210,9 @@ class _Iteration:
     def _level(self, values: np.ndarray) -> float:
         return float(values.mean())
 
-    def _linear(self, guess: np.ndarray, last: HeatState | None, count: int, products: int) -> HeatState:
+    def _linear(
+        self, guess: np.ndarray, last: HeatState | None, tolerance: float, counts: tuple[int, int]
+    ) -> HeatState:
         """Solve the system linearised at temperatures. Collective."""
         problem, decomposition, timer = self.problem, self.decomposition, self.problem.timer
         touch = self.joints.touch(guess, self.given.pressure, self.given.gap)
@@ -220,9 +230,9 @@ class _Iteration:
             start = None
             if last is not None and last.torn.numbering is torn.numbering:
                 start = last.solution.multiplier
-            solution = solve_dual(system, ProjectedCG(tolerance=problem.tolerance), start)
+            solution = solve_dual(system, ProjectedCG(tolerance=tolerance), start)
             field = system.displacement(solution.multiplier, solution.alpha)
-        return self._state(system, solution, field, heated, conductance, friction, (count, products))
+        return self._state(system, solution, field, heated, conductance, friction, counts)
 
     def _heated(self, guess: np.ndarray, friction: np.ndarray) -> Iterator[Heated]:
         tearing, points = self.decomposition.tearing, self.joints.points

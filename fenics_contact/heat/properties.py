@@ -205,6 +205,11 @@ class TemperatureTable(Property):
         """Return the property at temperatures, of the same shape."""
         return np.interp(temperature, self.temperature, self.value)
 
+    def slope(self, temperature: np.ndarray) -> np.ndarray:
+        """Return its derivative at temperatures, zero beyond the ends."""
+        slopes = np.diff(self.value) / np.diff(self.temperature)
+        return np.concatenate([[0.0], slopes, [0.0]])[np.searchsorted(self.temperature, temperature)]
+
 
 #: A number, a table or a function of temperatures, or UFL of coordinates and temperature.
 GivenProperty: TypeAlias = float | Property | Callable[[np.ndarray], np.ndarray] | Ufl

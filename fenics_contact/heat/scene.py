@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isnan, nan
+from math import inf, isnan, nan
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -397,11 +397,21 @@ class HeatScene:
         return tuple(each for each in given if not callable(each) and not isnan(each))
 
     @property
+    def absolute_zero(self) -> float:
+        """The highest absolute zero that a part was given, −∞ where nothing radiates."""
+        parts = (*self.loads, *(each.law for each in self.contacts))
+        return max((each.absolute_zero for each in parts), default=-inf)
+
+    @property
+    def only_films_vary(self) -> bool:
+        """Whether bodies and contacts do not depend on the temperature: then steps are Newton's."""
+        laws = any(each.law.by_temperature or each.friction.by_temperature for each in self.contacts)
+        return not laws and all(body.is_linear for body in self.bodies.values())
+
+    @property
     def is_linear(self) -> bool:
         """Whether nothing depends on the temperature."""
-        laws = any(each.law.by_temperature or each.friction.by_temperature for each in self.contacts)
-        bodies = all(body.is_linear for body in self.bodies.values())
-        return bodies and not laws and all(each.is_linear for each in self.loads)
+        return self.only_films_vary and all(each.is_linear for each in self.loads)
 
 
 def _typical(body: ConductingBody) -> Any:
