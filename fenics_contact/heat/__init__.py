@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from fenics_contact.heat.properties import Conductor, TemperatureTable
     from fenics_contact.heat.scene import ConductingBody, HeatScene, ThermalContact
     from fenics_contact.heat.state import HeatBalance, HeatState, HeatThroughContact
+    from fenics_contact.heat.time import HeatHistory, heat_in_time
 
 __all__ = [
     "Conductance",
@@ -44,6 +45,7 @@ __all__ = [
     "HeatBalance",
     "HeatFlux",
     "HeatPlan",
+    "HeatHistory",
     "HeatProblem",
     "HeatScene",
     "HeatSource",
@@ -57,6 +59,7 @@ __all__ = [
     "ThermalContact",
     "effusivity_share",
     "harmonic_mean",
+    "heat_in_time",
     "solve_heat",
     "solve_heated",
 ]

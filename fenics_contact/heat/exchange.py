@@ -38,7 +38,11 @@ class Exchange:
 
     def heat(self, temperature: np.ndarray) -> float:
         """Return what the load gives at temperatures, (n,), [power]."""
-        return float((self.load - self.matrix @ temperature).sum())
+        return float(self.at_nodes(temperature).sum())
+
+    def at_nodes(self, temperature: np.ndarray) -> np.ndarray:
+        """Return what it gives to each node, (n,), [power]."""
+        return np.asarray(self.load - self.matrix @ temperature)
 
 
 def given(load: np.ndarray) -> Exchange:

@@ -280,9 +280,11 @@ class _Iteration:
         heat = np.zeros(self.joints.points.count)
         heat[conductance * self.joints.area > 0.0] = passing
         balance = self._balance(torn, solution, field, heated, (heat, tied), friction)
+        inside = zip(heated, self.decomposition.parts, strict=True)
+        rates = tuple(-each.stored.at_nodes(field[part]) for each, part in inside)
         return HeatState(
             self.scene, torn, heated, system, solution, self.joints, values,
-            self._contacts(values, conductance, heat, friction.sum(axis=0)), tied, balance,
+            self._contacts(values, conductance, heat, friction.sum(axis=0)), tied, balance, rates,
             counts[0], counts[1] + system.products, dict(self.problem.timer.seconds),
         )  # fmt: skip
 
@@ -313,11 +315,12 @@ class _Iteration:
     ) -> HeatBalance:
         """Return where heat comes from. Collective."""
         scene, comm = self.scene, self.decomposition.comm
-        entering = np.zeros(len(scene.held) + len(scene.loads) + 1)
+        entering = np.zeros(len(scene.held) + len(scene.loads) + 2)
         for each, part in zip(heated, self.decomposition.parts, strict=True):
             for number, exchange in each.exchanges.items():
                 entering[len(scene.held) + number] += exchange.heat(field[part])
-            entering[-1] -= each.stored.heat(field[part])
+            stored = -each.stored.at_nodes(field[part])
+            entering[-2:] += stored.sum(), np.abs(stored).sum()
         first = self._first_held
         self._add_held(entering, first, torn, solution)
         entering = comm.allreduce(entering)
@@ -338,7 +341,7 @@ class _Iteration:
                 slave, master = friction[:, self.joints.points.pair == number].sum(axis=1)
                 entering_master = float(master) * contact.pair.between_bodies
                 parts[f"FrictionHeat {contact.place}"] = float(slave) + entering_master
-        return HeatBalance(parts, float(entering[-1]))
+        return HeatBalance(parts, *map(float, entering[-2:]))
 
     @property
     def _first_held(self) -> np.ndarray:

@@ -73,16 +73,29 @@ class HeatBalance:
     Attributes:
         by_part: Heat of each held temperature, load and obstacle by its place.
         stored: Heat that bodies take up.
+        moved: Heat that their nodes take up or give off, by magnitude.
     """
 
     by_part: Mapping[str, float]
     stored: float
+    moved: float = 0.0
+
+    @classmethod
+    def combined(cls, *terms: tuple[float, HeatBalance]) -> HeatBalance:
+        """Return the sum of balances, each times a factor."""
+        names = {name: None for _, balance in terms for name in balance.by_part}
+        parts = {name: sum(factor * each.by_part.get(name, 0.0) for factor, each in terms) for name in names}
+        stored, moved = np.sum(
+            [(factor * each.stored, factor * each.moved) for factor, each in terms], axis=0
+        )
+        return cls(parts, float(stored), float(moved))
 
     @property
     def error(self) -> float:
         """What comes in less what is stored, relative to all that comes and goes."""
         flows = np.array([*self.by_part.values(), -self.stored])
-        return float(abs(flows.sum()) / max(np.abs(flows).sum(), np.finfo(float).tiny))
+        scale = max(np.abs(flows).sum(), self.moved, np.finfo(float).tiny)
+        return float(abs(flows.sum()) / scale)
 
     def _facts(self) -> dict[str, Any]:
         parts = {name: f"{heat:.6g}" for name, heat in self.by_part.items()}
@@ -105,6 +118,7 @@ class HeatState(OnBodies):
         contacts: What passes through each contact, in the order of the scene.
         ties: Heat that passes at tied points from slave to master, shape (n,), [power].
         balance: Where heat comes from and where it goes.
+        rates: Heat that the nodes of each subdomain of this rank take up, shape (n,) each, [power].
         iterations: Linear systems that were solved.
         products: Applications of the dual operator.
         seconds: Wall time by phase.
@@ -120,6 +134,7 @@ class HeatState(OnBodies):
     contacts: tuple[HeatThroughContact, ...]
     ties: np.ndarray
     balance: HeatBalance
+    rates: tuple[np.ndarray, ...]
     iterations: int
     products: int
     seconds: Mapping[str, float]
