@@ -325,9 +325,10 @@ def solve_heated(
         ConvergenceError: If there is no steady state, or none is found.
 
     Example:
-        >>> heat = HeatScene.on(scene, {"rod": steel}, held=[hot], contacts=[joint])  # doctest: +SKIP
-        >>> state = solve_heated(scene, heat, MPI.COMM_WORLD, stress_free=20.0)  # doctest: +SKIP
-        >>> later = solve_heated(pressed, heat, MPI.COMM_WORLD, before=state, duration=5.0)  # doctest: +SKIP
+        >>> steel, hot = Conductor(0.05, 3.7e-3), HeldTemperature("rod", "x0", 80.0)
+        >>> heat = HeatScene.on(scene, {"rod": steel}, held=[hot])  # doctest: +SKIP
+        >>> steady = solve_heated(scene, heat, comm, stress_free=20.0)  # doctest: +SKIP
+        >>> later = solve_heated(scene, heat, comm, before=steady, duration=5.0)  # doctest: +SKIP
     """
     cold: Any = stress_free if isinstance(stress_free, Mapping) else dict.fromkeys(heat.bodies, stress_free)
     given, old, words = start or {}, cold, "temperatures free of stress"
@@ -335,6 +336,12 @@ def solve_heated(
         _checked(scene, heat, cold)
         for name in given:
             check_known(name, heat.bodies, f"start has temperatures of body {name!r}, the heat has")
+        materials = [each for body in heat.bodies.values() for each in body.materials]
+        if before is not None and duration < np.inf and not all(each.capacities for each in materials):
+            raise InvalidInputError(
+                f"a step of a time, got {duration:g}, needs heat capacities of all bodies: give "
+                "Conductor(conductivity, heat_capacity), or leave out the duration for a steady state"
+            )
     if before is not None:
         problems, mechanics = before.problems, before.mechanics
         old, words = before.heat.temperature, "those before the step"

@@ -318,7 +318,7 @@ class HeatScene:
         those of the scene. Raises `InvalidInputError` if a body is not there, or has several thicknesses.
 
         Example:
-            >>> heat = HeatScene.on(scene, {"rod": Conductor(0.05)}, held=[hot])  # doctest: +SKIP
+            >>> heat = HeatScene.on(scene, {"rod": Conductor(0.05)}, held=[...])  # doctest: +SKIP
         """
         bodies = {}
         for name, material in materials.items():

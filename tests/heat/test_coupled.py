@@ -159,6 +159,7 @@ def test_pressures_come_from_the_pair_with_the_same_surfaces(other_way: bool):
     assert state.passes > 1
 
 
+@pytest.mark.slow
 def test_without_a_pair_gaps_are_what_displacements_leave():
     scene, heat = two_bars(8.0)
     heat = replace(
@@ -294,6 +295,7 @@ def test_constants_follow_the_temperatures_that_are_computed():
         solve_heated(scene, heat, MPI.COMM_SELF)
 
 
+@pytest.mark.slow
 def test_steps_store_heat_and_end_in_the_steady_state():
     scene, heat = rod(film(1.0, 0.01), 100.0, 0.0, 0.04)
     heat = replace(heat, bodies={"rod": replace(heat.bodies["rod"], material=Conductor(CONDUCTIVITY, 2.0))})
@@ -318,6 +320,11 @@ def test_both_fields_need_the_same_bodies_and_meshes():
         HeatScene.on(scene, {"bar": Conductor(1.0)})
     with pytest.raises(InvalidInputError, match="stress_free needs a temperature of body 'rod', it has"):
         solve_heated(scene, heat, MPI.COMM_SELF, stress_free={"bar": 0.0})
+    steady = solve_heated(scene, heat, MPI.COMM_SELF)
+    with pytest.raises(
+        InvalidInputError, match="a step of a time, got 2, needs heat capacities of all bodies"
+    ):
+        solve_heated(scene, heat, MPI.COMM_SELF, before=steady, duration=2.0)
     with pytest.raises(InvalidInputError, match="start has temperatures of body 'bar', the heat has"):
         solve_heated(scene, heat, MPI.COMM_SELF, start={"bar": 0.0})
 
