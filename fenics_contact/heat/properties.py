@@ -201,6 +201,30 @@ class TemperatureTable(Property):
         object.__setattr__(self, "temperature", tuple(at.tolist()))
         object.__setattr__(self, "value", tuple(values.tolist()))
 
+    @property
+    def kind(self) -> Hashable:  # type: ignore[override]
+        """Its length: values at the points of the quadrature follow kinks within cells."""
+        return "table", len(self.value)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:  # type: ignore[override]
+        """Its temperatures, then its values."""
+        return (*self.temperature, *self.value)
+
+    def symbols(self, element: Element, number: int) -> Symbols:
+        """Return the first value and what each interval adds to it."""
+        import ufl
+
+        field = ufl.Coefficient(element.nodal, count=FIRST_COUNT + number)
+        count = len(self.value)
+        symbols = tuple(element.constant() for _ in range(2 * count))
+        at, values = symbols[:count], symbols[count:]
+        whole = values[0]
+        for k in range(count - 1):
+            share = ufl.max_value(0.0, ufl.min_value(1.0, (field - at[k]) / (at[k + 1] - at[k])))
+            whole += share * (values[k + 1] - values[k])
+        return Symbols(whole, symbols, (field,))
+
     def at(self, temperature: np.ndarray) -> np.ndarray:
         """Return the property at temperatures, of the same shape."""
         return np.interp(temperature, self.temperature, self.value)
@@ -209,6 +233,10 @@ class TemperatureTable(Property):
         """Return its derivative at temperatures, zero beyond the ends."""
         slopes = np.diff(self.value) / np.diff(self.temperature)
         return np.concatenate([[0.0], slopes, [0.0]])[np.searchsorted(self.temperature, temperature)]
+
+    def fields(self, temperature: np.ndarray) -> Fields:
+        """Return the temperature."""
+        return (temperature,)
 
 
 #: A number, a table or a function of temperatures, or UFL of coordinates and temperature.
@@ -296,8 +324,12 @@ class Conductor:
     def capacities(self) -> tuple[Property, ...]:
         """The heat capacity as a property, nothing where it was not given."""
         remedy = "steel has about 3.7e6 J/(m³ K), which is 3.7e-3 J/(mm³ K)"
-        given = self.heat_capacity
-        return () if given is None else (property_of("Conductor.heat_capacity", given, remedy),)
+        name, given = "Conductor.heat_capacity", self.heat_capacity
+        if given is None:
+            return ()
+        found = property_of(name, given, remedy)
+        # At nodes, where means over temperatures store the heat of the table exactly.
+        return (ByFunction(name, found.at) if isinstance(found, TemperatureTable) else found,)
 
     @property
     def is_linear(self) -> bool:

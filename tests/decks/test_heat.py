@@ -94,6 +94,13 @@ def test_conductivity_follows_the_temperature(tmp_path: Path) -> None:
     assert 0.4 * rise + 0.0005 * rise**2 == pytest.approx(20.0 * 4.0, rel=1e-3)
 
 
+def test_conductivity_may_jump_within_cells(tmp_path: Path) -> None:
+    # From 20 to 52 in the first cell, from there to 100 in three that conduct twice as well.
+    jump = "*CONDUCTIVITY\n0.4, 0.\n0.4, 52.\n0.8, 52.0001\n"
+    given = BAR.replace("*CONDUCTIVITY\n0.4\n", jump)
+    assert at_end(tmp_path, "*DFLUX\n4, S4, 12.8\n", given) == pytest.approx(100.0, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("card", "along"),
     [
