@@ -31,6 +31,7 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError, collectiv
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.heat.acceleration import Anderson
 from fenics_contact.heat.assembly import Rate
+from fenics_contact.heat.fields import BothOnBodies
 from fenics_contact.heat.friction import FrictionHeat
 from fenics_contact.heat.joints import Joints
 from fenics_contact.heat.plausible import odd_power, warn_of
@@ -45,7 +46,7 @@ _LOG = logging.getLogger(__name__)
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class HeatedState:
+class HeatedState(BothOnBodies):
     """Mechanics and temperatures that agree.
 
     Attributes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -86,6 +87,10 @@ class HeatProblem:
         self._assemblies: tuple[Assembly, ...] = ()
         self._joints: Joints | None = None
         self._stiffness = np.zeros(0)
+
+    def _facts(self) -> dict[str, Any]:
+        bodies = {name: body.mesh.cells_in_words for name, body in self.scene.bodies.items()}
+        return {"bodies": bodies, "ranks": self.comm.size, "tolerance": self.tolerance}
 
     @property
     def decomposition(self) -> Decomposition:
@@ -387,8 +392,8 @@ def solve_heat(
         ConvergenceError: If a solver, or the iteration of laws that depend on temperatures, does not settle.
 
     Example:
-        >>> state = solve_heat(scene, MPI.COMM_WORLD)  # doctest: +SKIP
-        >>> state.temperature["upper"].max()  # doctest: +SKIP
+        >>> warm = solve_heat(scene, MPI.COMM_WORLD)  # doctest: +SKIP
+        >>> warm.temperature["upper"].max()  # doctest: +SKIP
     """
     problem = HeatProblem(scene, comm, partitions=partitions, tolerance=tolerance)
     warn_of(odd_values(scene), comm)

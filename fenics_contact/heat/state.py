@@ -5,28 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fenics_contact._base.display import displayed
-from fenics_contact._base.libraries import MPI
-from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import collectively
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.heat.assembly import Heated
-from fenics_contact.heat.fields import contact_columns, fields_of, record_of
+from fenics_contact.heat.fields import HeatOnBodies
 from fenics_contact.heat.joints import Joints
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.mesh.cell_types import cell_type_of, quadrature, shape_gradients, shape_values
 from fenics_contact.mesh.collapsed import as_hexahedra, places_of
 from fenics_contact.qp.solution import DualSolution
-from fenics_contact.results.fields import GatheredFields, body_mesh, nodal_function
-from fenics_contact.results.on_bodies import OnBodies
-
-if TYPE_CHECKING:
-    import dolfinx
 
 
 @displayed
@@ -104,7 +97,7 @@ class HeatBalance:
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class HeatState(OnBodies):
+class HeatState(HeatOnBodies):
     """Temperatures of a scene, replicated on all ranks.
 
     Attributes:
@@ -138,42 +131,6 @@ class HeatState(OnBodies):
     iterations: int
     products: int
     seconds: Mapping[str, float]
-
-    kind = "heat"
-
-    @property
-    def comm(self) -> MPI.Comm:
-        """The communicator over which subdomains are spread."""
-        return self.torn.decomposition.comm
-
-    @property
-    def geometry(self) -> Scene:
-        """Meshes, surfaces and obstacles."""
-        return self.scene.geometry
-
-    def gather_fields(self, body: str) -> GatheredFields:
-        """Return the fields of a body.
-
-        On nodes ``temperature``, ``nodal_heat_flux``, the mean of the cells around a node, and, where there
-        are contacts, on those of slaves ``contact_heat_flux``, positive towards the master,
-        ``contact_conductance`` and ``contact_temperature_jump``, zero on all others; on cells ``heat_flux``
-        and ``subdomain``.
-        """
-        return fields_of(self, body)
-
-    def functions(self, body: str) -> list[dolfinx.fem.Function]:
-        """Return the temperature of a body as a Function on its own mesh. Collective."""
-        whole = self.geometry.bodies[body]
-        mesh = body_mesh(self.torn.decomposition, body, whole)
-        return [nodal_function(mesh, "temperature", whole.mesh.at_nodes_apart(self.temperature[body]))]
-
-    def record(self) -> dict[str, Any]:
-        """Return what `write_result` writes of it."""
-        return record_of(self)
-
-    def contact_columns(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Return the contact of each point by its number, and the columns of `write_contact_table`."""
-        return contact_columns(self)
 
     @cached_property
     def temperature(self) -> dict[str, np.ndarray]:

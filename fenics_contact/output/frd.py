@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from functools import singledispatch
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -317,14 +317,17 @@ def nodal_fields(state: OnBodies, numbering: BodyNumbers, kinds: Sequence[str]) 
 
 @singledispatch
 def _values(
-    state: OnBodies, numbering: BodyNumbers, kinds: Sequence[str], count: np.ndarray
+    state: Any, numbering: BodyNumbers, kinds: Sequence[str], count: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return values at nodes by kind; `count`: bodies that share each node, (n, 1). Collective."""
+    found: dict[str, np.ndarray] = {}
+    for part in state.parts:
+        found |= _values(part, numbering, kinds, count)
     fields = {name: state.gather_fields(name).points for name in state.geometry.deforming}
-    return {
-        kind: in_space(numbering.summed({name: own[key] for name, own in fields.items()}) / count)
-        for key, kind in FrdField.others.items()
-    }
+    for key, kind in FrdField.others.items():
+        known = {name: own[key] for name, own in fields.items() if key in own}
+        found[kind] = in_space(numbering.summed(known) / count)
+    return found
 
 
 @_values.register

@@ -337,7 +337,9 @@ def result_record(
 @singledispatch
 def _record(state: Any, errors: bool) -> dict[str, Any]:
     """Return head and parts of the record of a result, by default one that has them itself. Collective."""
-    return {**_head(state.kind, state.comm), **readable(state.record())}
+    head = [_head(state.kind, state.comm), *(_record(part, errors) for part in state.parts)]
+    known = {name: value for each in head for name, value in each.items()}
+    return {**known, **readable(state.record()), "kind": state.kind}
 
 
 @_record.register

@@ -13,19 +13,33 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import RigidPlane, Surface, result_page, write_result, write_vtu
+from fenics_contact import (
+    Body,
+    ContactPair,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    result_page,
+    write_result,
+    write_vtu,
+)
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.heat import (
     ConductingBody,
     Conductor,
+    HeatedState,
     HeatFlux,
     HeatScene,
     HeatState,
     HeldTemperature,
+    PressureConductance,
     ThermalContact,
     solve_heat,
+    solve_heated,
 )
+from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.output import read_result, write_contact_table, write_frd, write_heat_balance, write_xdmf
 from fenics_contact.pictures import Units, plot_field, plot_stress
 from fenics_contact.pictures.canvas import LEVEL_MAP
@@ -163,6 +177,48 @@ def test_records_have_the_balance_and_pages_show_it(tmp_path: Path):
         assert "90.909 W" in text
         assert "largest jump of the temperature" in text
         assert '"colours": "level"' in text
+
+
+@cache
+def pressed() -> HeatedState:
+    """Press a warm block on a cold one."""
+    steel = IsotropicElasticity(2.1e5, 0.3, thermal_expansion=1.2e-5)
+    bodies = {
+        name: Body(block((0, 0, z), (2, 2, z + 2), (n, n, 2)), steel)
+        for name, z, n in (("lower", 0.0, 2), ("upper", 2.0, 3))
+    }
+    sides = Surface("upper", "z0"), Surface("lower", "z1")
+    supports = [
+        Support("lower", "z0", (0.0, 0.0, 0.0)),
+        Support("upper", "z1", (0.0, 0.0, -0.001)),
+    ]
+    scene = Scene(bodies, supports, contacts=[ContactPair(*sides)])
+    joint = ThermalContact(*sides, PressureConductance(50.0, 1000.0))
+    held = [HeldTemperature("lower", "z0", 20.0), HeldTemperature("upper", "z1", 60.0)]
+    heat = HeatScene.on(scene, {name: Conductor(50.0) for name in bodies}, held=held, contacts=[joint])
+    return solve_heated(scene, heat, MPI.COMM_SELF, stress_free=20.0)
+
+
+def test_mechanics_and_heat_are_seen_together(tmp_path: Path):
+    state = pressed()
+    fields = state.gather_fields("upper")
+    assert {"displacement", "temperature", "contact_pressure", "contact_heat_flux"} <= set(fields.points)
+    assert {"von_mises", "heat_flux", "subdomain"} <= set(fields.cells)
+    assert plot_field(state, "temperature", scale=100.0, width=300).png is not None
+    write_result(state, tmp_path)
+    write_vtu(state, tmp_path)
+    write_xdmf(state, tmp_path / "both.xdmf")
+    record = read_result(tmp_path)
+    assert record["kind"] == "heated"
+    assert record["forces"]["contacts"][0]["force"][2] > 1.0
+    assert record["heat"]["contact"][0]["heat"] == pytest.approx(state.heat.contacts[0].total)
+    text = result_page(tmp_path).html or ""
+    assert "temperature of upper" in text
+    assert "sum of normal forces" in text
+    frd = read_frd(write_frd(tmp_path / "both.frd", state))
+    kinds = {"DISP", "STRESS", "TOSTRAIN", "FORC", "CONTACT", "NDTEMP", "FLUX"}
+    assert {each.kind for each in frd.blocks} == kinds
+    assert len(rows_of(write_contact_table(state, tmp_path / "contact.csv"))) == 16
 
 
 def test_pictures_of_mechanics_know_no_heat():

@@ -9,6 +9,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import Enum
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -118,6 +119,27 @@ from fenics_contact.design import (
 from fenics_contact.design.adjoint import linearise_face, solve_adjoint
 from fenics_contact.design.remeshed import Remeshing
 from fenics_contact.gallery import block, rectangle
+from fenics_contact.heat import (
+    ConductanceTable,
+    ConductingBody,
+    Conductor,
+    Convection,
+    EvenConductance,
+    FrictionHeat,
+    GapConductance,
+    GapRadiation,
+    HeatAtNodes,
+    HeatedState,
+    HeatFlux,
+    HeatProblem,
+    HeatScene,
+    HeatSource,
+    HeldTemperature,
+    PressureConductance,
+    Radiation,
+    TemperatureTable,
+    ThermalContact,
+)
 from fenics_contact.materials import (
     AnisotropicElasticity,
     FinitePlasticity,
@@ -154,11 +176,11 @@ from tests.design.blocks import block_on_floor, designs_of
 from tests.large_deformations.scenes import pressed, rounded
 from tests.scenes import partitions
 
-FACES = ("materials", "mesh", "results", "design")
+FACES = ("materials", "mesh", "results", "design", "heat")
 MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
-    "ClosureLaw", "Elasticity", "EnergyModel", "FrictionCurve", "WearCurve",
+    "ClosureLaw", "Conductance", "Elasticity", "EnergyModel", "FrictionCurve", "WearCurve",
     "HistoryMaterial", "Hyperelasticity", "Inexact", "Kinked", "Material",
     "NearlyIncompressible", "Objective", "MaxFunction", "Resumable", "RigidObstacle", "State", "SurfaceShape",
     "Thermoelastic", "Transverse", "Weighable",
@@ -252,10 +274,33 @@ def objects() -> dict[str, Any]:
         MovedSurface(shape.designs[0], scene.bodies["block"].mesh, np.zeros(shape.size)),
     ]  # fmt: skip
     roots.append(solve_scene(pressed(rounded(2), 0.1), MPI.COMM_SELF))
+    roots += heated(contact, state)
     found: dict[str, Any] = {}
     for root in roots:
         _collect(root, found)
     return found
+
+
+def heated(contact: ContactProblem, state: AnyState) -> list[Any]:
+    """Return objects of heat: states, a plan, and laws and loads that its scene has not."""
+    names = [f"plate {k}" for k in range(3)]
+    bodies = {
+        name: ConductingBody(block((0, 0, k), (1, 1, k + 1), (2, 2, 2)), Conductor(0.05, 3.7e-3))
+        for k, name in enumerate(names)
+    }
+    joints = [ThermalContact(Surface(b, "z0"), Surface(a, "z1"), 1.0) for a, b in pairwise(names)]
+    held = [HeldTemperature("plate 0", "z0", lambda x: x[:, 0])]
+    problem = HeatProblem(HeatScene(bodies, held, [HeatFlux("plate 2", "z1", 1.0)], joints), MPI.COMM_SELF)
+    warm = problem.solve()
+    return [
+        warm, problem, HeatedState(state, warm, 1, "20 degrees", 0.0, (contact, problem)),
+        problem.scene.plan(), Conductor(np.eye(3)),
+        ConductanceTable((0.0, 1.0), (0.1, 0.2)), EvenConductance(1.0), PressureConductance(1.0, 1.0),
+        GapConductance(1.0, 0.1), GapRadiation(0.5, 0.5), TemperatureTable((0.0, 1.0), (1.0, 2.0)),
+        FrictionHeat(0.3, lambda x: x[:, 0]), Radiation("a", "z0", 0.9, 300.0),
+        Convection("a", "z0", TemperatureTable((0.0, 1.0), (1.0, 2.0)), 20.0), HeatSource("a", 1.0),
+        HeatAtNodes("a", "z0", 1.0),
+    ]  # fmt: skip
 
 
 def _collect(value: Any, found: dict[str, Any]) -> None:
