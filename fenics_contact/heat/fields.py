@@ -53,7 +53,7 @@ class HeatOnBodies(OnBodies):
 
     @abstractmethod
     def nodal_flux(self, body: str) -> np.ndarray:
-        """Return the heat flux at the nodes of a body by material, (n_materials, n_nodes, dim). Collective."""
+        """Return the heat flux at nodes by material, (n_materials, n_nodes, dim). Collective."""
 
     @property
     def comm(self) -> MPI.Comm:
@@ -69,14 +69,17 @@ class HeatOnBodies(OnBodies):
         """Return the fields of a body. Collective.
 
         On nodes ``temperature``, ``nodal_heat_flux``, `HeatState.nodal_flux` in the material in which it is
-        largest, and, where there are contacts, on those of slaves ``contact_heat_flux``, positive towards the master,
-        ``contact_conductance`` and ``contact_temperature_jump``, zero on all others; on cells ``heat_flux``
-        and ``subdomain``.
+        largest, and, where there are contacts, on those of slaves ``contact_heat_flux``, positive towards the
+        master, ``contact_conductance`` and ``contact_temperature_jump``, zero on all others; on cells
+        ``heat_flux`` and ``subdomain``.
         """
         mesh, decomposition, flux = self.scene.bodies[body].mesh, self.torn.decomposition, self.flux[body]
         first = decomposition.tearing.subdomain_offset[decomposition.tearing.body_names.index(body)]
         subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
-        on_nodes = {"temperature": self.temperature[body], "nodal_heat_flux": mesh.hanging.placed(_largest(self.nodal_flux(body)))}
+        on_nodes = {
+            "temperature": self.temperature[body],
+            "nodal_heat_flux": mesh.hanging.placed(_largest(self.nodal_flux(body))),
+        }
         for contact, through in zip(self.scene.contacts, self.contacts, strict=True):
             for name, key in _ON_SLAVES.items():
                 own = on_nodes.setdefault(key, np.zeros(mesh.n_nodes))
