@@ -180,6 +180,45 @@ assert np.all(contact.normal_force[closed] > 0)
 print(state.estimate_errors())
 
 # %% [markdown]
+# ## Heat through the contact
+#
+# Let the tower be warm above and the table cool below. Rough surfaces conduct where they are pressed
+# together, by $h = c\,p/H$: heat takes the way through the pressed edge. In N and mm heat is in N mm/s = mW.
+
+# %%
+from fenics_contact.heat import (
+    Conductor,
+    HeatScene,
+    HeldTemperature,
+    PressureConductance,
+    ThermalContact,
+    solve_heated,
+)  # fmt: skip
+
+joint = ThermalContact(
+    Surface("tower", "z0"), Surface("table", "z1"), PressureConductance(20.0, hardness=1000.0)
+)
+ends = [HeldTemperature("table", "z0", 20.0), HeldTemperature("tower", "z1", 80.0)]  # °C
+conductors = {"table": Conductor(50.0), "tower": Conductor(50.0)}  # N/(s K)
+warm = solve_heated(scene, HeatScene.on(scene, conductors, held=ends, contacts=[joint]), MPI.COMM_WORLD)
+celsius = pictures.Units(temperature="°C", power="mW")
+pictures.plot_field(warm, "temperature", clip=((0, 10, 0), (0, -1, 0)), units=celsius, width=1200)
+
+# %% [markdown]
+# *Cut in the middle: isotherms bend towards the right edge, where heat passes; at the left edge, which has
+# lifted off, the temperature jumps.*
+#
+# If only the joint resisted, $c\,F_z\,\Delta T/H$ would pass, whatever the pressure is like. The blocks
+# resist, too, so that it is less; and what enters above leaves below, to rounding:
+
+# %%
+passed, most = warm.heat.contacts[0].total, 20.0 / 1000.0 * 16000.0 * 60.0
+print(f"heat {passed:.0f} mW, through the joint alone {most:.0f} mW")
+print(f"largest jump of the temperature {warm.heat.contacts[0].jump.max():.2f} degrees")
+assert 0.3 * most < passed < most
+assert warm.heat.balance.error < 1e-8
+
+# %% [markdown]
 # ## To look at it elsewhere
 #
 # A file for [ParaView](https://www.paraview.org), with displacement, stress and all contact fields; open

@@ -169,7 +169,7 @@ class HeatState(HeatOnBodies):
         """Return the heat that enters a body through any of its named surfaces, [power]. Collective.
 
         It is what is left of the balance of each node, and loads as they were integrated: heat through
-        surfaces that make up the boundary of a body adds up to what its sources lack and it stores, to
+        surfaces that make up the boundary of a body adds up to what it stores less what its sources give, to
         rounding, and is far more accurate than integrals of the flux. That of a node on several surfaces
         which hold or touch counts for each by its area around the node.
 
