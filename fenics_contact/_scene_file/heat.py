@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from fenics_contact._scene_file.reading import Builder, SceneFile, made_of
-from fenics_contact.errors import together
 
 if TYPE_CHECKING:
     from fenics_contact._scene.scene import Scene
@@ -87,13 +84,6 @@ class HeatFile(SceneFile):
         builder = _HeatBuilder(self.source, self._complete, self.comm)
         bodies = builder.bodies_alone()
         return HeatScene(bodies, **builder.parts(bodies))
-
-    @cached_property
-    def partitions(self) -> dict[str, np.ndarray]:
-        """Body name -> subdomain of every cell. Collective on first use."""
-        field = self.scene.field
-        with self._at("solver", "subdomains"), together(self.comm):
-            return self.document.solver.cut(field, self.comm.size)
 
     def solve(self) -> HeatState:  # type: ignore[override]
         """Compute the temperatures, see `solve_heat`. Collective."""

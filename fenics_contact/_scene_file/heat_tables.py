@@ -13,7 +13,7 @@ from fenics_contact._scene_file import document
 from fenics_contact._scene_file.bodies import AnyMaterial
 from fenics_contact._scene_file.model import Master, SurfaceOfBody, TiePart
 from fenics_contact._scene_file.part import IN_FILES, Part, built, keys_of, table_of
-from fenics_contact._scene_file.source import Path
+from fenics_contact._scene_file.source import Path, parts_of
 from fenics_contact._scene_file.values import Line, Numbers, Read, ScalarField, either, field_or, one_of
 from fenics_contact.heat import conductance, parts
 from fenics_contact.heat.friction import FrictionHeat
@@ -150,22 +150,30 @@ class HeatDocument(document.Document):
     bodies: dict[str, ConductingAlonePart] = Field(min_length=1, description="bodies by name")  # type: ignore[assignment]
     output: HeatOutputPart = Field(HeatOutputPart(), description="what is written, and where")
     heat: HeatPart = Field(description="heat of the bodies")  # type: ignore[assignment]
+    why: ClassVar[str] = "is of mechanics, this file has heat alone: leave it out"
 
     @property
     def known(self) -> Mapping[str, Collection[str]]:  # type: ignore[override]
         """Names of what conducts."""
         return {"a material of heat": self.heat.materials}
 
+    def refused(self) -> Mapping[type, set[str]]:
+        """Return keys of tables that have no meaning in such a file."""
+        own = {"title", "units", "meshes", "bodies", "heat", "solver", "output"}
+        of_body = {"material", "torsion", "integration"}
+        return {HeatDocument: {*HeatDocument.model_fields} - own, ConductingAlonePart: of_body,
+                HeatPart: {"stress_free", "duration"}, document.SolverPart: _OF_SOLVERS}  # fmt: skip
+
     def misfits(self) -> Iterator[tuple[Path, str]]:
-        """Yield keys of mechanics without it."""
-        alone = {"title", "units", "meshes", "bodies", "heat", "solver", "output"}
-        others: list[Path] = [(key,) for key in self.model_fields_set - alone]
-        others += [("solver", key) for key in self.solver.model_fields_set - {"subdomains", "tolerance"}]
-        for name, body in self.bodies.items():
-            others += [("bodies", name, key) for key in body.model_fields_set - _OF_CONDUCTING]
-            if body.heat is None:
-                yield ("bodies", name), "must have 'heat', what it conducts with: this file has heat alone"
-        yield from ((path, "is of mechanics, this file has heat alone: leave it out") for path in others)
+        """Yield keys that have no meaning in such a file."""
+        refused = self.refused()
+        for path, part in parts_of(self, Part):
+            for key in sorted(part.model_fields_set & refused.get(type(part), set())):
+                yield (*path, key), self.why
+        for name in [
+            name for name, body in self.bodies.items() if HeatDocument is type(self) and not body.heat
+        ]:
+            yield ("bodies", name), "must have 'heat', what it conducts with: this file has heat alone"
 
 
 class HeatedDocument(HeatDocument):
@@ -176,16 +184,13 @@ class HeatedDocument(HeatDocument):
     output: document.OutputPart = Field(  # type: ignore[assignment]
         document.OutputPart(), description="what is written, and where"
     )
+    why: ClassVar[str] = "does not go with mechanics and heat together: leave it out"
 
-    def misfits(self) -> Iterator[tuple[Path, str]]:
-        """Yield keys that do not go with heat."""
-        others = self.model_fields_set & {"steps", "accuracy", "design", "automatic_contact"}
-        paths: list[Path] = [(key,) for key in others]
-        paths += [("solver", key) for key in self.solver.model_fields_set - {"subdomains", "tolerance"}]
-        for name, body in self.bodies.items():
-            if body.heat and "thickness" in body.heat.model_fields_set:
-                yield ("bodies", name, "heat", "thickness"), "is that of its mechanics: leave it out"
-        yield from ((path, "does not go with [heat] and [materials]: leave it out") for path in paths)
+    def refused(self) -> Mapping[type, set[str]]:
+        """Return keys of tables that have no meaning in such a file."""
+        return {HeatedDocument: {"steps", "accuracy", "design", "automatic_contact"},
+                ConductingPart: {"thickness"}, document.SolverPart: _OF_SOLVERS}  # fmt: skip
 
 
-_OF_CONDUCTING = {"mesh", "part", "axisymmetric", "heat"}
+#: What solvers of mechanics alone take.
+_OF_SOLVERS = {*document.SolverPart.model_fields} - {"subdomains", "tolerance"}

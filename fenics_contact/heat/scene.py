@@ -378,6 +378,10 @@ class HeatScene:
         varying += [each.law.by_temperature for each in self.contacts]
         return dict(Counter([*names, *["law that depends on the temperature"] * sum(varying)]))
 
+    def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
+        """Cut every body into subdomains of a suitable size, see `Scene.partition`."""
+        return self.field.partition(ranks)
+
     def plan(self, partitions: Mapping[str, np.ndarray] | None = None, *, ranks: int = 1) -> HeatPlan:
         """Return what will be built: unknowns, rows, memory; arguments as for `Scene.plan`.
 
@@ -386,7 +390,7 @@ class HeatScene:
         """
         from fenics_contact.heat.plan import make_plan
 
-        places, cut = [each.place for each in self.contacts], partitions or self.field.partition(ranks)
+        places, cut = [each.place for each in self.contacts], partitions or self.partition(ranks)
         return make_plan(self.field, self.geometry, self.effects(), places, cut, ranks)
 
     @property

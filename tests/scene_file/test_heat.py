@@ -179,6 +179,7 @@ def test_every_table_builds_its_part() -> None:
         ("[[heat.held]]", '[[supports]]\nbody = "a"\nsurface = "x0"\n[[heat.held]]',
          "line 16: supports is of mechanics, this file has heat alone: leave it out"),
         ("[meshes]", "solver.method = 'smalse'\n[meshes]", "line 1: solver.method is of mechanics, this"),
+        ("[heat.materials.steel]", "[heat]\nduration = 1.0\n[heat.materials.steel]", "line 6: heat.duration"),
         ('heat.material = "steel"\n\n[bodies.b]', "\n[bodies.b]",
          "line 8: bodies.a must have 'heat', what it conducts with: this file has heat alone"),
     ],
@@ -289,12 +290,12 @@ def test_mechanics_and_heat_of_one_file_are_those_of_python(
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[materials.steel]", "[[steps]]\n[materials.steel]", "line 5: steps does not go with [heat]"),
+        ("[materials.steel]", "[[steps]]\n[materials.steel]", "line 5: steps does not go with mechanics"),
         ("[materials.steel]", "[solver]\nmethod = 'smalse'\n[materials.steel]", "line 6: solver.method"),
         ('material = "steel"\nheat.material = "steel"\n\n[bodies.b]', 'heat.material = "steel"\n[bodies.b]',
          "line 15: bodies.a must have 'material', got only mesh, heat"),
         ('heat.material = "steel"\n\n[bodies.b]', 'heat = { material = "steel", thickness = 2 }\n[bodies.b]',
-         "line 18: bodies.a.heat.thickness is that of its mechanics: leave it out"),
+         "line 18: bodies.a.heat.thickness does not go with mechanics and heat together"),
     ],
 )  # fmt: skip
 def test_what_does_not_go_with_mechanics_and_heat_is_named(
