@@ -61,7 +61,7 @@ def blocks(conductor: Conductor, law: object, *loads: object, held: Held = (300.
     [
         (lambda: blocks(Conductor(50.0), 100.0, GLOWING), 10, 70),
         slow(lambda: blocks(Conductor(50.0), GapRadiation(0.8, 0.8), GLOWING), 12, 90),
-        (lambda: blocks(Conductor(rising), 50.0), 14, 75),
+        slow(lambda: blocks(Conductor(rising), 50.0), 14, 75),
         slow(lambda: blocks(Conductor(TemperatureTable((300.0, 1500.0), (100.0, 1.0))), 50.0), 12, 70),
         slow(lambda: blocks(Conductor(rising), GapRadiation(0.8, 0.8), GLOWING), 17, 150),
     ],
