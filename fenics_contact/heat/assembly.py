@@ -40,13 +40,21 @@ class Heated:
     """A subdomain at some temperature.
 
     `exchanges`: with each load that acts on it, by its number; `stored`: the heat that goes into it;
-    `stiffened`: by which factor films, storage and the temperature have changed the diagonal, (n,).
+    `stiffened`: by which factor films, storage and the temperature have changed the diagonal, (n,); `even`:
+    what films and storage take of one degree everywhere, (n,).
     """
 
     subdomain: Subdomain
     exchanges: Mapping[int, Exchange]
     stored: Exchange
     stiffened: np.ndarray
+    even: np.ndarray
+
+    def residual(self, temperature: np.ndarray) -> np.ndarray:
+        """Return the heat that is given and not taken, (n,), which a large mean does not round."""
+        mean = float(temperature.mean())
+        taken = self.subdomain.stiffness @ (temperature - mean) + mean * self.even
+        return np.asarray(self.subdomain.load - taken)
 
 
 def _same(matrices: list[sp.csr_matrix], others: list[sp.csr_matrix]) -> bool:
@@ -61,7 +69,7 @@ class Assembly:
         """Prepare; nothing is assembled yet."""
         self.part = part
         self._known: dict[HeatLoad, Exchange] = {}
-        self._last: tuple[list[sp.csr_matrix], Subdomain, np.ndarray] | None = None
+        self._last: tuple[list[sp.csr_matrix], Subdomain, np.ndarray, np.ndarray] | None = None
 
     @cached_property
     def _conduction(self) -> sp.csr_matrix:
@@ -104,9 +112,9 @@ class Assembly:
         if not linear or self._last is None or not _same(self._last[0], beds):
             conduction = self._conduction if linear else part.conduction(temperature[nodes])
             self._last = beds, *self._subdomain(conduction, bed.tocsr())
-        _, subdomain, stiffened = self._last
+        _, subdomain, stiffened, even = self._last
         force = part.mesh.following.force(load)
-        return Heated(replace(subdomain, load=force), exchanges, stored, stiffened)
+        return Heated(replace(subdomain, load=force), exchanges, stored, stiffened, even)
 
     def _exchange(self, load: HeatLoad, temperature: np.ndarray) -> Exchange:
         if not load.is_linear:
@@ -132,11 +140,14 @@ class Assembly:
             known[factor] = (factor * matrix).tocsr()
         return known[factor]
 
-    def _subdomain(self, conduction: sp.csr_matrix, bed: sp.csr_matrix) -> tuple[Subdomain, np.ndarray]:
+    def _subdomain(
+        self, conduction: sp.csr_matrix, bed: sp.csr_matrix
+    ) -> tuple[Subdomain, np.ndarray, np.ndarray]:
         mesh, field, typical = self.part.mesh, self.part.field, self._typical
         whole = mesh.following.stiffness((conduction + bed).tocsr())
         ones = np.ones((mesh.size, 1))
-        resistance = float(bed.sum()) / mesh.size
+        even = mesh.following.force(bed @ ones[:, 0])
+        resistance = float(even.sum()) / mesh.size
         held = resistance > 0.0
         stiffened = np.ones(mesh.size)
         np.divide(whole.diagonal(), typical, out=stiffened, where=typical > 0.0)
@@ -145,4 +156,4 @@ class Assembly:
             ones[:, :0] if held else ones, float(typical.mean()), CachedMatrix(lambda: whole),
             ones / np.sqrt(mesh.size) if held else ones[:, :0],
             np.array([resistance]) if held else np.zeros(0), (), BY_MATRIX,
-        ), stiffened  # fmt: skip
+        ), stiffened, even  # fmt: skip

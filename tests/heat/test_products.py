@@ -79,8 +79,8 @@ STEPS = [1e-6, 1e-3, 1.0, 1e3, 1e6, np.inf]
 @pytest.mark.parametrize("step", STEPS[::2])
 def test_products_are_bounded_for_any_time_step(step: float):
     few, more = (solved(boxes(n, n, n, cells=2, held=True), step).products for n in (2, 3))
-    assert few <= 13
-    assert more <= 18
+    assert few <= 17  # a long step is corrected once, see `test_accuracy`
+    assert more <= 24
 
 
 @pytest.mark.parametrize("coefficient", [1e-6, 1.0, 1e6])
@@ -135,4 +135,4 @@ def test_products_do_not_grow_in_the_plane_or_in_slabs(step: float):
     few, more = (solved(boxes(n, n, cells=6, held=True), step).products for n in (5, 14))
     assert more <= few + 1
     few, more = (solved(boxes(n, 2, 2, held=True), step).products for n in (8, 54))
-    assert more <= few + 2
+    assert more <= few + 3

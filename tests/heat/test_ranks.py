@@ -39,4 +39,4 @@ def test_all_ranks_and_cuts_find_the_same_temperatures(kind: str, ranks: int):
 def test_ranks_refuse_a_law_of_one_rank_together(mpirun: Callable[..., str]):
     lines = mpirun(SCRIPT, 2, "refused").splitlines()
     assert len(lines) == 2
-    assert all("the conductivity of body 'top' must be finite and positive" in line for line in lines)
+    assert all("Conductor.conductivity must be finite and positive" in line for line in lines)
