@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ from fenics_contact.heat.problem import solve_heat
 from fenics_contact.heat.properties import Conductor
 from fenics_contact.heat.scene import ConductingBody, HeatScene, ThermalContact
 from fenics_contact.heat.state import HeatState
+from fenics_contact.heat.time import heat_in_time
 from fenics_contact.readers.deck_assembly import read_cards
 from fenics_contact.readers.deck_bodies import Component, build_bodies, regions_of, split_sections
 from fenics_contact.readers.deck_cards import Card, DeckError
@@ -89,13 +91,34 @@ class HeatDeck:
         last = {number: state for number, _, state in self.increments(comm, **settings)}
         return list(last.values())
 
-    def increments(self, comm: MPI.Comm) -> Iterator[tuple[int, float, HeatState]]:
-        """Yield step, time since it began and state where steps end. Collective."""
+    def increments(self, comm: MPI.Comm, error: float = 1e-3) -> Iterator[tuple[int, float, HeatState]]:
+        """Yield step, time since it began and state where steps end or amplitudes turn. Collective.
+
+        Steps in time are as long as the deck says with DIRECT, by Euler's rule as there; else they err by no
+        more than a part of the range of temperatures that are given.
+
+        Args:
+            comm: Communicator.
+            error: This part.
+        """
+        state: Any = self.initial
         for number, (cards, _) in enumerate(self.steps):
-            if not cards.steady:
-                raise cards.card.error("heat in time is not solved yet: add STEADY STATE")
-            state = solve_heat(self.scene(number), comm)
-            yield number, cards.period, state
+            if cards.steady:
+                state = solve_heat(self.scene(number), comm)
+                yield number, cards.period, state
+                continue
+            given = [
+                *self.scene(number).levels,
+                *(T for own in self.initial.values() for T in (own.min(), own.max())),
+            ]
+            how: Any = {"tolerance": error * (float(np.ptp(given)) or 1.0)}
+            if cards.direct:
+                how = {"step": cards.first, "scheme": "euler"}
+            history = heat_in_time(
+                partial(self.scene, number), comm, cards.period, state, outputs=cards.turns, **how
+            )
+            for time, state in zip(history.times[1:], history.states, strict=True):
+                yield number, float(time), state
 
     def statics(self, states: Sequence[HeatState]) -> Deck:
         """Return the deck of the steps in which bodies move, at the temperatures of states.
@@ -225,7 +248,11 @@ class _Builder:
         contacts, ties = self._contacts()
         steps = [(step, [*self._placed(step.acting)]) for step in self.steps]
         every = self.built.steps.initial
-        initial = {name: every[self.parts.nodes[name][: mesh.n_nodes]] for name, mesh in meshes.items()}
+        initial = {
+            # The centres of cells, which the deck has not, follow the nodes around them.
+            name: mesh.followers.followed(mesh.n_nodes) @ every[self.parts.nodes[name][: mesh.n_nodes]]
+            for name, mesh in meshes.items()
+        }
         known = any(card.name == "INITIALCONDITIONS" for card in self.cards)
         for step in () if known else (step for step in self.steps if not step.steady):
             raise step.card.error(
