@@ -174,7 +174,7 @@ class HeatState(HeatOnBodies):
         which hold or touch counts for each by its area around the node.
 
         Example:
-            >>> state.heat_through("lower", "z0")  # doctest: +SKIP
+            >>> warm.heat_through("lower", "z0")  # doctest: +SKIP
         """
         from fenics_contact.heat.accuracy import heat_through
 

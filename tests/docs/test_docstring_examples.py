@@ -52,6 +52,7 @@ GIVEN = {
     "start",
     "steel",
     "sweep",
+    "warm",
     "weight",
     "zinc",
 }

@@ -139,6 +139,7 @@ from fenics_contact.heat import (
     Radiation,
     TemperatureTable,
     ThermalContact,
+    heat_in_time,
 )
 from fenics_contact.materials import (
     AnisotropicElasticity,
@@ -293,6 +294,7 @@ def heated(contact: ContactProblem, state: AnyState) -> list[Any]:
     problem = HeatProblem(HeatScene(bodies, held, [HeatFlux("plate 2", "z1", 1.0)], joints), MPI.COMM_SELF)
     warm = problem.solve()
     return [
+        heat_in_time(problem.scene, MPI.COMM_SELF, 1.0, 20.0, step=1.0),
         warm, problem, HeatedState(state, warm, 1, "20 degrees", 0.0, (contact, problem)),
         problem.scene.plan(), Conductor(np.eye(3)),
         ConductanceTable((0.0, 1.0), (0.1, 0.2)), EvenConductance(1.0), PressureConductance(1.0, 1.0),
