@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact._base.display import counted
 from fenics_contact._scene.discretisation import in_words
-from fenics_contact._scene.memory import Subdomains, expected_memory
+from fenics_contact._scene.memory import Rates, Subdomains, expected_memory
 from fenics_contact._scene.pair_geometry import pair_geometry
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.tools import check_partitions
@@ -70,5 +70,6 @@ def make_plan(
     pairs = zip(places, geometry.contacts, strict=True)
     joints = [f"{place}; {pair_geometry(geometry, pair)}" for place, pair in pairs]
     joints += [f"{tie.place}; {in_words(tie)}" for tie in geometry.ties]
-    memory = expected_memory(field, parts, ranks)
+    # Each subdomain keeps matrices of its own, of conduction and of all that it exchanges: three as measured.
+    memory = expected_memory(field, parts, ranks) + 3.0 * Rates().entry * float(parts.couplings @ parts.size)
     return HeatPlan(effects, len(parts.size), unknowns, rows, memory, tuple(joints))
