@@ -202,7 +202,7 @@ def plan_of_states(file: SceneFile) -> dict[str, str]:
     """Return what is solved, name -> words. Collective."""
     rows = {name: words for plan in file.plans for name, words in _rows(plan).items()}
     if file.steps:
-        rows["load steps"] = str(len(file.steps))
+        rows[file.steps_in_words] = str(len(file.steps))
     halvings = file.document.solver.halvings
     if halvings:
         cells = 2 ** (halvings * file.scene.dim) * sum(b.mesh.n_cells for b in file.scene.deforming.values())

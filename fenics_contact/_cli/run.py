@@ -89,9 +89,30 @@ def _computed(file: SceneFile, console: Console, resume: bool | None) -> Found:
 
 @_computed.register
 def _(file: HeatFile, console: Console, resume: bool | None) -> Found:
-    state: Any = file.solve()
-    _keep_heat(console, file, state, file.folder)
-    return Found({file.title: state})
+    found: Any = file.solve()
+    if file.steps:
+        return Found({file.title: _over_time(console, file, found)})
+    _keep_heat(console, file, found, file.folder)
+    return Found({file.title: found})
+
+
+def _over_time(console: Console, file: HeatFile, history: Any) -> Any:
+    """Print and write a `HeatHistory`, and return its last state. Collective."""
+    console.write(str(history))
+    kinds, series = file.document.output.files, _series(file)
+    for number, (time, state) in enumerate(zip(file.steps, history.states, strict=True)):
+        if file.document.output.field_files:
+            series.add(state, time, f"time {time:g}")
+        if "csv" in kinds and state.geometry.contacts:
+            write_contact_table(state, file.folder / "contact" / f"step_{number:04d}.csv")
+    if "csv" in kinds:
+        write_heat_balance(history.states, file.folder / "steps.csv", file.steps)
+    write_result(history.states[-1], file.folder, more=_origin(file))
+    return history.states[-1]
+
+
+def _series(file: SceneFile) -> ResultSeries:
+    return ResultSeries(file.folder, "history", file.comm, formats=file.document.output.field_files)
 
 
 @_computed.register
@@ -235,7 +256,7 @@ def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> di
 def _writer(console: Console, file: SceneFile) -> Callable[[State, int, float, str], None]:
     """Return what writes the files of a load step: its state, number, time and name. Collective."""
     output = file.document.output
-    series = ResultSeries(file.folder, "history", console.comm, formats=output.field_files)
+    series = _series(file)
     table = StepTable(file.folder / "steps.csv", console.comm)
 
     def keep(state: State, number: int, time: float, name: str) -> None:

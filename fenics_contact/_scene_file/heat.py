@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from fenics_contact._scene_file.reading import Builder, SceneFile, made_of
+from fenics_contact._scene_file.values import at_time, changes
 
 if TYPE_CHECKING:
     from fenics_contact._scene.scene import Scene
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from fenics_contact.heat.coupled import HeatedState
     from fenics_contact.heat.scene import ConductingBody, HeatScene
     from fenics_contact.heat.state import HeatState
+    from fenics_contact.heat.time import HeatHistory
 
 
 class _HeatBuilder(Builder):
@@ -67,7 +69,7 @@ class HeatFile(SceneFile):
     """A scene file of heat alone; its scene is a `HeatScene`, its states are those of heat."""
 
     document: HeatDocument
-    steps = ()  # type: ignore[assignment]
+    steps_in_words = "times"
 
     @classmethod
     def documents(cls) -> type[HeatDocument]:
@@ -85,12 +87,39 @@ class HeatFile(SceneFile):
         bodies = builder.bodies_alone()
         return HeatScene(bodies, **builder.parts(bodies))
 
-    def solve(self) -> HeatState:  # type: ignore[override]
-        """Compute the temperatures, see `solve_heat`. Collective."""
-        from fenics_contact.heat.problem import solve_heat
+    @property
+    def steps(self) -> tuple[float, ...]:  # type: ignore[override]
+        """Times of its states, none if it is steady."""
+        time: Any = self.document.heat.time
+        return () if time is None else tuple(sorted({*time.outputs, time.duration}))
 
+    def solve(self) -> HeatState | HeatHistory:  # type: ignore[override]
+        """Compute the temperatures, see `solve_heat` and `heat_in_time`. Collective."""
+        from fenics_contact.heat.problem import solve_heat
+        from fenics_contact.heat.time import heat_in_time
+
+        document: Any = self._complete
+        time, fixed = document.heat.time, dict[str, Any](self.document.solver.fixed)
         with self._at("heat"):
-            return solve_heat(self.scene, self.comm, partitions=self.partitions, **self.document.solver.fixed)
+            if time is None:
+                return solve_heat(self.scene, self.comm, partitions=self.partitions, **fixed)
+            return heat_in_time(self._at_time, self.comm, partitions=self.partitions, **time.options)
+
+    def _at_time(self, time: float) -> HeatScene:
+        """Return the scene with its formulas in t at a time."""
+        scene = self.scene
+        parts = {key: getattr(scene, key) for key in ("held", "loads", "contacts")}
+        if not changes(tuple(vars(each) for own in parts.values() for each in own)):
+            return scene
+        now: dict[str, Any] = {key: [_now(each, time) for each in own] for key, own in parts.items()}
+        return replace(scene, **now)
+
+
+def _now(part: Any, time: float) -> Any:
+    """Return a part with the formulas in t of it at a time."""
+    return replace(
+        part, **{name: at_time(value, time) for name, value in vars(part).items() if changes(value)}
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from functools import reduce
 from operator import add
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, PositiveFloat
 
@@ -14,11 +14,21 @@ from fenics_contact._scene_file.bodies import AnyMaterial
 from fenics_contact._scene_file.model import Master, SurfaceOfBody, TiePart
 from fenics_contact._scene_file.part import IN_FILES, Part, built, keys_of, table_of
 from fenics_contact._scene_file.source import Path, parts_of
-from fenics_contact._scene_file.values import Line, Numbers, Read, ScalarField, either, field_or, one_of
+from fenics_contact._scene_file.values import (
+    Line,
+    Numbers,
+    Read,
+    ScalarField,
+    either,
+    field_or,
+    one_of,
+    with_message,
+)
 from fenics_contact.heat import conductance, parts
 from fenics_contact.heat.friction import FrictionHeat
 from fenics_contact.heat.properties import Conductor, TemperatureTable
 from fenics_contact.heat.scene import ThermalContact
+from fenics_contact.heat.time import heat_in_time
 
 IN_FILES.append((parts.Value, ScalarField, "; in quotes a formula in x, y, z, or a field from a file"))
 _Table: Any = table_of(TemperatureTable, temperature=Numbers, value=Numbers)
@@ -114,6 +124,36 @@ class ThermalContactPart(Part):
         )
 
 
+_SCHEMES = Literal["bdf2", "euler", "crank-nicolson"]
+_SCHEME = Annotated[
+    _SCHEMES | float, with_message("'bdf2', 'euler', 'crank-nicolson' or a number from 0.5 to 1")
+]
+
+
+@keys_of(heat_in_time, only=("duration", "begin"))
+class TimePart(Part):
+    """Temperatures over time, by steps of one length or of a given error."""
+
+    initial: either(dict, dict[str, ScalarField], float) = Field(  # type: ignore[valid-type]
+        description="temperature at the start, or by body, in degrees"
+    )
+    step: PositiveFloat | None = Field(
+        None, description="length of steps, with a tolerance of the longest, [time]"
+    )
+    tolerance: PositiveFloat | None = Field(
+        None, description="largest error of temperatures by steps, [degree]"
+    )
+    scheme: Annotated[Any, Read(_SCHEME)] = Field(
+        "bdf2", description="bdf2 is of second order, euler of first"
+    )
+    outputs: Numbers = Field((), description="times at which steps end and states are written, [time]")
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What is given of it."""
+        return {name: getattr(self, name) for name in self.model_fields_set}
+
+
 class HeatPart(Part):
     """Heat that bodies conduct: of what, what heats and cools them, where it passes."""
 
@@ -129,6 +169,8 @@ class HeatPart(Part):
         None,
         description="time in which loads act, for heat of friction; by default so long that it is none",
     )
+
+    time: TimePart | None = Field(None, description="temperatures over time; without it steady ones")
 
     @property
     def coupling(self) -> dict[str, Any]:
@@ -150,7 +192,7 @@ class HeatDocument(document.Document):
     bodies: dict[str, ConductingAlonePart] = Field(min_length=1, description="bodies by name")  # type: ignore[assignment]
     output: HeatOutputPart = Field(HeatOutputPart(), description="what is written, and where")
     heat: HeatPart = Field(description="heat of the bodies")  # type: ignore[assignment]
-    why: ClassVar[str] = "is of mechanics, this file has heat alone: leave it out"
+    why: ClassVar[str] = "has no meaning in this file of heat alone: leave it out"
 
     @property
     def known(self) -> Mapping[str, Collection[str]]:  # type: ignore[override]
@@ -162,7 +204,8 @@ class HeatDocument(document.Document):
         own = {"title", "units", "meshes", "bodies", "heat", "solver", "output"}
         of_body = {"material", "torsion", "integration"}
         return {HeatDocument: {*HeatDocument.model_fields} - own, ConductingAlonePart: of_body,
-                HeatPart: {"stress_free", "duration"}, document.SolverPart: _OF_SOLVERS}  # fmt: skip
+                HeatPart: {"stress_free", "duration"},
+                document.SolverPart: _OF_SOLVERS | ({"tolerance"} if self.heat.time else set())}  # fmt: skip
 
     def misfits(self) -> Iterator[tuple[Path, str]]:
         """Yield keys that have no meaning in such a file."""
@@ -189,7 +232,8 @@ class HeatedDocument(HeatDocument):
     def refused(self) -> Mapping[type, set[str]]:
         """Return keys of tables that have no meaning in such a file."""
         return {HeatedDocument: {"steps", "accuracy", "design", "automatic_contact"},
-                ConductingPart: {"thickness"}, document.SolverPart: _OF_SOLVERS}  # fmt: skip
+                ConductingPart: {"thickness"}, HeatPart: {"time"},
+                document.SolverPart: _OF_SOLVERS}  # fmt: skip
 
 
 #: What solvers of mechanics alone take.

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, singledispatch
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 from pydantic import BaseModel
@@ -372,6 +372,7 @@ class SceneFile:
     source: Source
     document: Document
     comm: MPI.Comm
+    steps_in_words: ClassVar[str] = "load steps"
 
     @classmethod
     def documents(cls) -> type[Document]:

@@ -19,6 +19,7 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError, collectiv
 from fenics_contact.errors.kinds import safe_log, user_code
 from fenics_contact.heat.assembly import Rate
 from fenics_contact.heat.parts import Value
+from fenics_contact.heat.plausible import odd_values, warn_of
 from fenics_contact.heat.problem import HeatProblem
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.heat.state import HeatBalance, HeatState
@@ -258,6 +259,7 @@ def heat_in_time(
         with user_code("the scene as a function of time"):
             first = at(0.0)
         values = _at_start(first, initial)
+    warn_of(odd_values(first), comm)
     problems = [HeatProblem(first, comm, partitions=partitions) for _ in range(1 + isfinite(tolerance))]
     tracks = [_Track(problem, at, weights, begin) for problem in problems]
     steps = _Steps(tracks, values, duration, step, tolerance)

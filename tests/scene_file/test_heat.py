@@ -32,6 +32,7 @@ from fenics_contact.heat import (
     Radiation,
     TemperatureTable,
     ThermalContact,
+    heat_in_time,
     solve_heat,
     solve_heated,
 )
@@ -177,8 +178,8 @@ def test_every_table_builds_its_part() -> None:
         ("conductance = 5.0", "conductance = 5.0\ntemperature = 3.0",
          "line 27: heat.contacts.0: ThermalContact.temperature of b x0 - a x1 is that of an obstacle, a b"),
         ("[[heat.held]]", '[[supports]]\nbody = "a"\nsurface = "x0"\n[[heat.held]]',
-         "line 16: supports is of mechanics, this file has heat alone: leave it out"),
-        ("[meshes]", "solver.method = 'smalse'\n[meshes]", "line 1: solver.method is of mechanics, this"),
+         "line 16: supports has no meaning in this file of heat alone: leave it out"),
+        ("[meshes]", "solver.method = 'smalse'\n[meshes]", "line 1: solver.method has no meaning in"),
         ("[heat.materials.steel]", "[heat]\nduration = 1.0\n[heat.materials.steel]", "line 6: heat.duration"),
         ('heat.material = "steel"\n\n[bodies.b]', "\n[bodies.b]",
          "line 8: bodies.a must have 'heat', what it conducts with: this file has heat alone"),
@@ -349,3 +350,43 @@ def test_nothing_that_holds_a_temperature_is_an_error_of_the_file() -> None:
     file: Any = read_scene_file(EXAMPLE, MPI.COMM_SELF, overrides=["heat.loads.1.coefficient=0.0"])
     with pytest.raises(InfeasibleError, match="'chip' and 'sink' have none and heat of HeatFlux chip y1"):
         file.solve()
+
+
+def test_temperatures_over_time_are_those_of_python(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    timed = BARS.replace("conductivity = 2.0", "conductivity = 2.0\nheat_capacity = 3.0").replace(
+        'value = "3 * y"', 'value = "3 * y * t"'
+    )
+    timed += "\n[heat.time]\ninitial = { a = 20.0, b = 30.0 }\nduration = 2.0\nstep = 0.25\noutputs = [0.5]\n"
+    path = tmp_path / "bars.toml"
+    path.write_text(f"output = {{ folder = '{tmp_path}/out', files = ['vtu', 'csv'] }}\n{timed}")
+    steel = Conductor(2.0, 3.0)
+    bodies = {
+        name: ConductingBody(rectangle((x, 0), (x + 1, 1), (2, 2)), steel) for name, x in (("a", 0), ("b", 1))
+    }
+
+    def at(t: float) -> HeatScene:
+        load = HeatFlux("b", "x1", lambda points: 3 * points[:, 1] * t)
+        joint = ThermalContact(Surface("b", "x0"), Surface("a", "x1"), 5.0)
+        return HeatScene(bodies, [HeldTemperature("a", "x0", 20.0)], [load], [joint])
+
+    start = {"a": 20.0, "b": 30.0}
+    by_hand = heat_in_time(at, MPI.COMM_SELF, 2.0, start, step=0.25, outputs=[0.5])
+    file: Any = read_scene_file(path, MPI.COMM_SELF)
+    history = file.solve()
+    np.testing.assert_allclose(history.values, by_hand.values, rtol=1e-10)
+    assert file.steps == (0.5, 2.0)
+    assert main(MPI.COMM_SELF, ["run", str(path), "--no-pictures"]) == 0
+    said = capsys.readouterr().out
+    assert "times           2" in said
+    assert "error by steps" in said
+    for name in ("result.json", "history.pvd", "steps.csv", "contact/step_0001.csv"):
+        assert (tmp_path / "out" / name).exists()
+    assert "\n2," in (tmp_path / "out" / "steps.csv").read_text()
+    path.write_text(timed.replace("step = 0.25", "scheme = 'bdf3'"))
+    with pytest.raises(SceneFileError, match=r"time.scheme must be 'bdf2', 'euler', 'crank-nicolson' or"):
+        read_scene_file(path, MPI.COMM_SELF)
+    path.write_text(f"solver.tolerance = 1e-9\n{timed}")
+    with pytest.raises(SceneFileError, match=r"line 1: solver.tolerance has no meaning in this file of heat"):
+        read_scene_file(path, MPI.COMM_SELF)
