@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from fenics_contact._base.late_names import late_names
 
 if TYPE_CHECKING:
+    from fenics_contact.heat.adjoint import HeatAdjoint, heat_adjoint
     from fenics_contact.heat.conductance import (
         Conductance,
         ConductanceTable,
@@ -16,6 +17,13 @@ if TYPE_CHECKING:
     )
     from fenics_contact.heat.coupled import HeatedState, solve_heated
     from fenics_contact.heat.friction import FrictionHeat, effusivity_share
+    from fenics_contact.heat.objectives import (
+        HeatObjective,
+        HeatOfContact,
+        HeatOfHeld,
+        JointResistance,
+        TemperatureMean,
+    )
     from fenics_contact.heat.parts import (
         Convection,
         HeatAtNodes,
@@ -41,10 +49,14 @@ __all__ = [
     "FrictionHeat",
     "GapConductance",
     "GapRadiation",
+    "HeatAdjoint",
     "HeatAtNodes",
     "HeatBalance",
     "HeatFlux",
     "HeatHistory",
+    "HeatObjective",
+    "HeatOfContact",
+    "HeatOfHeld",
     "HeatPlan",
     "HeatProblem",
     "HeatScene",
@@ -53,12 +65,15 @@ __all__ = [
     "HeatThroughContact",
     "HeatedState",
     "HeldTemperature",
+    "JointResistance",
     "PressureConductance",
     "Radiation",
+    "TemperatureMean",
     "TemperatureTable",
     "ThermalContact",
     "effusivity_share",
     "harmonic_mean",
+    "heat_adjoint",
     "heat_in_time",
     "solve_heat",
     "solve_heated",

@@ -18,6 +18,7 @@ import ufl
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.csr import Csr
+from fenics_contact._fem.load_forms import FIRST_COUNT
 from fenics_contact._fem.templates import LOADED, Template, Templates, Written, volume_measure
 from fenics_contact._kinematics.element import Element
 from fenics_contact._scene.body import Body
@@ -68,6 +69,27 @@ class HeatForms:
 
         key = ("conduction", tuple(each.kind for each in given), shape, element)
         return self.templates.get(key, ("conduction", element.name), write)
+
+    def conduction_by_temperature(self, material: Conductor, element: Element) -> Template:
+        """Return ∂/∂T of ∫ k(T) ∇U·∇w along test functions, with nodal U and w."""
+        given = [(place, each) for place, each in np.ndenumerate(material.tensor) if each.varies]
+
+        def write() -> Written:
+            U, w = (ufl.Coefficient(element.nodal, count=FIRST_COUNT + number) for number in range(2))
+            parts = [each.by_temperature(element, number + 2) for number, (_, each) in enumerate(given)]
+            density = ufl.as_ufl(0.0)
+            for (place, _), part in zip(given, parts, strict=True):
+                along = U.dx(place[0]) * w.dx(place[0]) if place else ufl.dot(ufl.grad(U), ufl.grad(w))
+                density += part.expression * along
+            constants = tuple(symbol for part in parts for symbol in part.constants)
+            fields = tuple(symbol for part in parts for symbol in part.coefficients)
+            density = density * ufl.TestFunction(element.displacements)[0]
+            measure = volume_measure(element, 2)(LOADED)
+            return element.integrand(density) * measure, constants, (U, w, *fields)
+
+        kinds = tuple((place, each.kind) for place, each in given)
+        key = ("conduction by temperature", kinds, element)
+        return self.templates.get(key, ("conduction by temperature", element.name), write)
 
     def storage(self, capacity: Property, element: Element) -> Template:
         """Return ∫ c u v over the marked cells."""
@@ -155,6 +177,21 @@ class Part:
             fields = tuple(field for each in given for field in each.fields(temperature))
             template = self.forms.conduction(material, self.element)
             total = total + self._bound(template, given, fields, number)
+        return total
+
+    def conduction_by_temperature(self, temperature: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return ∂/∂T of wᵀ K(T) U at U = T, shape (n,), `along`: w; what K itself does not have of it."""
+        total = np.zeros(self.mesh.size)
+        for number, material in enumerate(self.body.materials):
+            given = [each for each in material.tensor.ravel() if each.varies]
+            if not given:
+                continue
+            template = self.forms.conduction_by_temperature(material, self.element)
+            nodal = [temperature, along, *(field for each in given for field in each.slopes(temperature))]
+            values = [value for each in given for value in each.numbers]
+            fields = [self._field(each) for each in nodal]
+            form = template.bind([self.mesh.space], values, fields, cells=self._marked(number))
+            total += self.body.thickness * self.mesh.force_of(_dolfinx.assemble_vector(form))
         return total
 
     def capacity(self, before: np.ndarray, after: np.ndarray) -> sp.csr_matrix:

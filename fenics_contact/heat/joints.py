@@ -96,6 +96,10 @@ class Joints:
             heat[:, mine] = np.outer((law.share, 1.0 - law.share), self.area[mine] * flux)
         return heat
 
+    def at_nodes(self, heat: np.ndarray) -> np.ndarray:
+        """Return heat that enters slave and master at the points, (2, n), at all nodes, (n_nodes,)."""
+        return np.asarray(self.points.own.T @ heat[0] + self.points.master.T @ heat[1])
+
     @property
     def places(self) -> np.ndarray:
         """Where the slave nodes of the points are, (n, dim)."""

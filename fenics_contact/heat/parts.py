@@ -15,7 +15,7 @@ from fenics_contact._scene.checks import check_known, check_not_negative, check_
 from fenics_contact._scene.fields import OfPosition, evaluate, finite_numbers
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.heat.exchange import Exchange, Place, given
-from fenics_contact.heat.properties import TemperatureTable, property_of
+from fenics_contact.heat.properties import TemperatureTable, property_of, slope_of
 from fenics_contact.mesh.body_mesh import BodyMesh
 
 #: A number, or a function of points, shape (n, dim) to (n,).
@@ -255,6 +255,14 @@ class Film(OnSurface):
             return Exchange(secant, secant @ ambient)
         tangent = on.surface(slope, self.surface)
         return Exchange(tangent, secant @ ambient + (tangent - secant) @ temperature)
+
+    def beyond(self, on: Place, temperature: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return the derivative of wᵀ M(h) (T − T_a) by T at nodes, less that of `exchange`; `along`: w."""
+        points, ambient = on.points, self._at(self.ambient, on.points)
+        h, tangent = self.coefficients(points, temperature, ambient)
+        by = slope_of(lambda T: self.coefficients(points, T, ambient)[0], temperature)
+        film = on.surface(h, self.surface) - on.surface(tangent, self.surface)
+        return np.asarray(film @ along + by * (on.surface(temperature - ambient, self.surface) @ along))
 
     @abstractmethod
     def coefficients(

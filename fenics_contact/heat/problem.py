@@ -287,8 +287,8 @@ class _Iteration:
         return solution, field, products
 
     def _heated(self, guess: np.ndarray, friction: np.ndarray) -> Iterator[Heated]:
-        tearing, points = self.decomposition.tearing, self.joints.points
-        rubbed = points.own.T @ friction[0] + points.master.T @ friction[1]
+        tearing = self.decomposition.tearing
+        rubbed = self.joints.at_nodes(friction)
         for number, assembly in enumerate(self.problem._assemblies):
             name = assembly.part.mesh.body
             first = tearing.first_of(name)

@@ -35,6 +35,12 @@ class Symbols:
     coefficients: tuple[ufl.Coefficient, ...] = ()
 
 
+def slope_of(law: Callable[[np.ndarray], np.ndarray], temperature: np.ndarray) -> np.ndarray:
+    """Return the derivative of a law by the temperature at temperatures, of the same shape."""
+    step = 1e-5 * np.maximum(np.abs(temperature), 1.0)
+    return np.asarray((law(temperature + step) - law(temperature - step)) / (2.0 * step))
+
+
 class Property(ABC):
     """A positive property of a material, such as its conductivity; by default its form has a nodal field."""
 
@@ -51,6 +57,14 @@ class Property(ABC):
 
         field = ufl.Coefficient(element.nodal, count=FIRST_COUNT + number)
         return Symbols(field, (), (field,))
+
+    def by_temperature(self, element: Element, number: int) -> Symbols:
+        """Return its derivative by the temperature, likewise; by default that at nodes, a field."""
+        return Property.symbols(self, element, number)
+
+    def slopes(self, temperature: np.ndarray) -> Fields:
+        """Return the fields of `by_temperature` at temperatures of nodes, shape (n,)."""
+        return (slope_of(self.at, temperature),)
 
     @abstractmethod
     def at(self, temperature: np.ndarray) -> np.ndarray:
@@ -123,8 +137,41 @@ class ByFunction(Property):
         return values.reshape(temperature.shape)
 
 
+class Written(Property):
+    """What is written in UFL, and holds at the points of the quadrature."""
+
+    @abstractmethod
+    def written(self, x: Any, temperature: Any, constants: tuple[Any, ...]) -> Any:
+        """Return it (UFL) at coordinates and a temperature, by constants for its `numbers`."""
+
+    def symbols(self, element: Element, number: int) -> Symbols:
+        """Return it with the temperature as field."""
+        return self._symbols(element, number, lambda expression, _: expression)
+
+    def by_temperature(self, element: Element, number: int) -> Symbols:
+        """Return its derivative, likewise."""
+        import ufl
+
+        return self._symbols(element, number, ufl.diff)
+
+    def _symbols(self, element: Element, number: int, made: Callable[[Any, Any], Any]) -> Symbols:
+        import ufl
+
+        field = ufl.Coefficient(element.nodal, count=FIRST_COUNT + number)
+        at, constants = ufl.variable(field), tuple(element.constant() for _ in self.numbers)
+        return Symbols(made(self.written(element.x, at, constants), at), constants, (field,))
+
+    def fields(self, temperature: np.ndarray) -> Fields:
+        """Return the temperature."""
+        return (temperature,)
+
+    def slopes(self, temperature: np.ndarray) -> Fields:
+        """Return the temperature."""
+        return (temperature,)
+
+
 @dataclass(frozen=True)
-class ByUfl(Property):
+class ByUfl(Written):
     """UFL of coordinates and temperature, evaluated at the points of the quadrature."""
 
     name: str
@@ -135,14 +182,12 @@ class ByUfl(Property):
         """The function itself."""
         return self.given
 
-    def symbols(self, element: Element, number: int) -> Symbols:
+    def written(self, x: Any, temperature: Any, constants: tuple[Any, ...]) -> Any:
         """Return what the function makes of coordinates and temperature."""
         import ufl
 
-        field = ufl.Coefficient(element.nodal, count=FIRST_COUNT + number)
         with user_code(f"the function given as {self.name}"):
-            expression = ufl.as_ufl(self.given.function(element.x, field))  # type: ignore[call-arg]
-        return Symbols(expression, (), (field,))
+            return ufl.as_ufl(self.given.function(x, temperature))  # type: ignore[call-arg]
 
     def at(self, temperature: np.ndarray) -> np.ndarray:
         """Refuse: it is known in forms alone."""
@@ -160,10 +205,6 @@ class ByUfl(Property):
             values = [self.given.function(ufl.as_vector(x), ufl.as_ufl(T)) for x, T in flat]  # type: ignore[call-arg]
             return np.array([ufl.as_ufl(each)(()) for each in values]).reshape(temperature.shape)
 
-    def fields(self, temperature: np.ndarray) -> Fields:
-        """Return the temperature."""
-        return (temperature,)
-
     def mean_fields(self, before: np.ndarray, after: np.ndarray) -> Fields:
         """Return the temperature in the middle."""
         return (0.5 * (before + after),)
@@ -171,7 +212,7 @@ class ByUfl(Property):
 
 @dataclass(frozen=True)
 @checked()
-class TemperatureTable(Property):
+class TemperatureTable(Written):
     """A property by temperature: straight between values, constant beyond the ends.
 
     Attributes:
@@ -211,19 +252,17 @@ class TemperatureTable(Property):
         """Its temperatures, then its values."""
         return (*self.temperature, *self.value)
 
-    def symbols(self, element: Element, number: int) -> Symbols:
+    def written(self, x: Any, temperature: Any, constants: tuple[Any, ...]) -> Any:
         """Return the first value and what each interval adds to it."""
         import ufl
 
-        field = ufl.Coefficient(element.nodal, count=FIRST_COUNT + number)
         count = len(self.value)
-        symbols = tuple(element.constant() for _ in range(2 * count))
-        at, values = symbols[:count], symbols[count:]
+        at, values = constants[:count], constants[count:]
         whole = values[0]
         for k in range(count - 1):
-            share = ufl.max_value(0.0, ufl.min_value(1.0, (field - at[k]) / (at[k + 1] - at[k])))
+            share = ufl.max_value(0.0, ufl.min_value(1.0, (temperature - at[k]) / (at[k + 1] - at[k])))
             whole += share * (values[k + 1] - values[k])
-        return Symbols(whole, symbols, (field,))
+        return whole
 
     def at(self, temperature: np.ndarray) -> np.ndarray:
         """Return the property at temperatures, of the same shape."""
@@ -233,10 +272,6 @@ class TemperatureTable(Property):
         """Return its derivative at temperatures, zero beyond the ends."""
         slopes = np.diff(self.value) / np.diff(self.temperature)
         return np.concatenate([[0.0], slopes, [0.0]])[np.searchsorted(self.temperature, temperature)]
-
-    def fields(self, temperature: np.ndarray) -> Fields:
-        """Return the temperature."""
-        return (temperature,)
 
 
 #: A number, a table or a function of temperatures, or UFL of coordinates and temperature.

@@ -1,0 +1,274 @@
+"""Quantities of temperatures and heat with their derivatives by temperatures."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from fenics_contact._base.checks import checked
+from fenics_contact.errors import together
+from fenics_contact.feti.averages import nodal_sum
+from fenics_contact.feti.decomposition import Decomposition, prescribed_along
+from fenics_contact.heat.assembly import Assembly, Heated, Rate
+from fenics_contact.heat.forms import HeatForms, Part
+from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.properties import slope_of
+from fenics_contact.heat.scene import HeatScene
+
+
+@dataclass(frozen=True, eq=False)
+class AtTemperatures:
+    """A scene at given temperatures, which need not be in balance; held ones are at what the scene says."""
+
+    scene: HeatScene
+    decomposition: Decomposition
+    joints: Joints
+    parts: tuple[Part, ...]
+    heated: tuple[Heated, ...]
+    values: np.ndarray
+
+    @classmethod
+    def of(cls, scene: HeatScene, decomposition: Decomposition, values: np.ndarray) -> AtTemperatures:
+        """Assemble a scene whose bodies have the cells of the decomposition. Collective."""
+        tearing, forms = decomposition.tearing, HeatForms(decomposition.forms.templates)
+        forms.prepare(scene)
+        held = prescribed_along(scene.field, tearing)[0][:, 0]
+        values = followed(scene, decomposition, np.where(np.isnan(held), values, held))
+        parts = tuple(
+            Part(mesh, scene.bodies[mesh.body], scene.field.bodies[mesh.body], forms)
+            for mesh in decomposition.meshes
+        )
+        joints, heated = Joints.of(scene, decomposition), []
+        with together(decomposition.comm):
+            touch = joints.touch(values, joints.pressure, joints.points.gap)
+            rubbed = joints.at_nodes(joints.friction(touch, np.zeros(joints.points.count)))
+            for part in parts:
+                nodes = tearing.global_nodes(part.mesh.body, np.arange(part.body.mesh.n_nodes))
+                own, rate = values[nodes], Rate(0.0, values[nodes], ())
+                heated.append(Assembly(part).heated(scene, own, rate, 0, rubbed[nodes]))
+        return cls(scene, decomposition, joints, parts, tuple(heated), values)
+
+    @cached_property
+    def conductance(self) -> np.ndarray:
+        """The product h A of the points, (n_points,)."""
+        return self.joints.area * self._law(*self.joints.sides(self.values))
+
+    @cached_property
+    def passing(self) -> np.ndarray:
+        """Heat that passes from slave to master at the points, (n_points,)."""
+        slave, master = self.joints.sides(self.values)
+        return self.conductance * (slave - master)
+
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """R at the nodes, without the heat of ties, (n_nodes,). Collective on first use."""
+        load = self._summed(lambda number, _: -self.heated[number].subdomain.load)
+        return self._flow(self.values) + load + self.joints.points.jump.T @ self.passing
+
+    def nodes(self, body: str, surface: str) -> np.ndarray:
+        """Return the numbers of the nodes of a surface or a set among all."""
+        own = self.scene.bodies[body].mesh.nodes_of(surface)
+        return self.decomposition.tearing.global_nodes(body, own)
+
+    def weights(self, body: str, surface: str) -> np.ndarray:
+        """Return ∫ φ and ∫ φ² of each node over a surface, or a body, (2, n_nodes). Collective."""
+
+        def mass(part: Part, power: int) -> np.ndarray:
+            part.place()
+            ones = np.full(part.mesh.size, float(part.mesh.body == body))
+            over = part.surface(ones, surface) if ones.any() and surface else part.volume(ones, "")
+            return np.asarray(over.diagonal() if power == 2 else over @ np.ones(part.mesh.size))
+
+        return np.stack([self._summed(lambda _, part: mass(part, power)) for power in (1, 2)])
+
+    def by_passing(self, weight: np.ndarray) -> np.ndarray:
+        """Return the derivative by temperatures of heat that passes, with weights of points, (n_nodes,)."""
+        return np.asarray(self.joints.points.jump.T @ (self.conductance * weight)) + self._by_law(weight)
+
+    def transposed(self, weight: np.ndarray) -> np.ndarray:
+        """Return R_Tᵀ w, (n_nodes,). Collective."""
+        jump = self.joints.points.jump
+        return self._flow(weight) + jump.T @ (self.conductance * (jump @ weight)) + self.beyond(weight)
+
+    def beyond(self, weight: np.ndarray) -> np.ndarray:
+        """Return Nᵀ w: what laws add that depend on temperatures, (n_nodes,). Collective."""
+        forms = HeatForms(self.decomposition.forms.templates)
+        for name, field in self.scene.field.bodies.items():  # all ranks together
+            for material in self.scene.bodies[name].materials:
+                forms.conduction_by_temperature(material, field.element)
+
+        def of_part(_: int, part: Part) -> np.ndarray:
+            temperature, along = self._on(part, self.values), self._on(part, weight)
+            part.place()
+            total = part.conduction_by_temperature(temperature, along)
+            for load in self.scene.loads:
+                if load.body == part.mesh.body and not load.is_linear:
+                    total = total + load.beyond(part, temperature, along)  # type: ignore[union-attr]
+            return part.mesh.following.force(total)
+
+        return (
+            self._summed(of_part) + self._by_law(self.joints.points.jump @ weight) - self._by_friction(weight)
+        )
+
+    def _by_friction(self, weight: np.ndarray) -> np.ndarray:
+        """Return the derivative by temperatures of the heat of friction, with weights of nodes, (n_nodes,)."""
+        joints, points = self.joints, self.joints.points
+        touch = joints.touch(self.values, joints.pressure, points.gap)
+        none, along = np.zeros(points.count), np.stack([points.own @ weight, points.master @ weight])
+
+        def of_mean(change: np.ndarray) -> np.ndarray:
+            warmer = replace(touch, slave=touch.slave + change, master=touch.master + change)
+            return np.asarray((joints.friction(warmer, none) * along).sum(axis=0))
+
+        slopes = 0.5 * slope_of(of_mean, none)
+        of_master = np.where(joints.on_obstacle, 0.0, slopes)
+        return np.asarray(points.own.T @ slopes + points.master.T @ of_master)
+
+    def _flow(self, values: np.ndarray) -> np.ndarray:
+        """Return A T without contacts."""
+        return self._summed(
+            lambda number, part: self.heated[number].subdomain.stiffness @ self._on(part, values)
+        )
+
+    def _on(self, part: Part, values: np.ndarray) -> np.ndarray:
+        return values[self.decomposition.tearing.global_nodes(part.mesh.body, part.mesh.nodes)]
+
+    def _summed(self, of_part: Callable[[int, Part], np.ndarray]) -> np.ndarray:
+        torn = [of_part(number, part) for number, part in enumerate(self.parts)]
+        return nodal_sum(self.decomposition, np.concatenate([np.zeros(0), *torn]))[:, 0]
+
+    def _law(self, slave: np.ndarray, master: np.ndarray) -> np.ndarray:
+        joints = self.joints
+        touch = joints.touch(self.values, joints.pressure, joints.points.gap)
+        return joints.conductance(replace(touch, slave=slave, master=master))
+
+    def _by_law(self, weight: np.ndarray) -> np.ndarray:
+        """Return what conductances that depend on temperatures add to `by_passing`."""
+        points, (slave, master) = self.joints.points, self.joints.sides(self.values)
+        weight = self.joints.area * (slave - master) * weight
+        by_slave = slope_of(lambda T: self._law(T, master), slave)
+        by_master = np.where(self.joints.on_obstacle, 0.0, slope_of(lambda T: self._law(slave, T), master))
+        return np.asarray(points.own.T @ (by_slave * weight) + points.master.T @ (by_master * weight))
+
+
+def followed(scene: HeatScene, decomposition: Decomposition, values: np.ndarray) -> np.ndarray:
+    """Return values with those of hanging nodes and centres as they follow from others."""
+    result = values.copy()
+    for name, body in scene.bodies.items():
+        own = decomposition.tearing.global_nodes(name, np.arange(body.mesh.n_nodes))
+        result[own] = body.mesh.followers.followed(body.mesh.n_nodes) @ values[own]
+    return result
+
+
+class HeatObjective(ABC):
+    """A quantity J(T) of a scene `AtTemperatures`."""
+
+    @abstractmethod
+    def value(self, at: AtTemperatures) -> float:
+        """Return J. Collective."""
+
+    @abstractmethod
+    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
+        """Return ∂J/∂T at the nodes of all bodies, replicated, (n_nodes,). Collective."""
+
+
+@dataclass(frozen=True)
+@checked()
+class TemperatureMean(HeatObjective):
+    """A mean of temperatures, (∫ (T − T₀)ᵖ / ∫ 1)^(1/p): the larger p, the closer to the highest.
+
+    Attributes:
+        body: Name of the body.
+        surface: Name of its surface; the whole body by default.
+        exponent: p ≥ 1; 1 is the mean, other powers are summed over nodes with ∫ φ² of each as its weight.
+        level: T₀, below all temperatures unless p = 1.
+    """
+
+    body: str
+    surface: str = ""
+    exponent: float = 1.0
+    level: float = 0.0
+
+    def value(self, at: AtTemperatures) -> float:
+        """Return the mean."""
+        weight, over = self._over(at)
+        top = float(np.abs(over).max()) or 1.0
+        return top * float((weight @ (over / top) ** self.exponent) ** (1.0 / self.exponent))
+
+    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
+        """Return the weights, at larger powers mostly those of the hottest nodes."""
+        weight, over = self._over(at)
+        return np.asarray(weight * (over / (self.value(at) or 1.0)) ** (self.exponent - 1.0))
+
+    def _over(self, at: AtTemperatures) -> tuple[np.ndarray, np.ndarray]:
+        """Return weights whose sum is one, and T − T₀, one where they are zero."""
+        weight = at.weights(self.body, self.surface)[int(self.exponent != 1.0)]
+        return weight / weight.sum(), np.where(weight != 0.0, at.values - self.level, 1.0)
+
+
+@dataclass(frozen=True)
+@checked()
+class HeatOfHeld(HeatObjective):
+    """The heat that enters through a held surface, at all its nodes, [power].
+
+    Attributes:
+        body: Name of the body.
+        surface: Name of its surface, or set of nodes, that a `HeldTemperature` holds.
+    """
+
+    body: str
+    surface: str
+
+    def value(self, at: AtTemperatures) -> float:
+        """Return the sum of the residuals."""
+        return float(at.residual[at.nodes(self.body, self.surface)].sum())
+
+    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
+        """Return the rows of these nodes, summed."""
+        weight = np.zeros(len(at.values))
+        weight[at.nodes(self.body, self.surface)] = 1.0
+        return at.transposed(weight)
+
+
+@dataclass(frozen=True)
+@checked()
+class HeatOfContact(HeatObjective):
+    """The heat that passes through a contact from slave to master, [power].
+
+    Attributes:
+        contact: Its number among those of the scene.
+    """
+
+    contact: int
+
+    def value(self, at: AtTemperatures) -> float:
+        """Return the sum over its points."""
+        return float(at.passing[at.joints.points.pair == self.contact].sum())
+
+    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
+        """Return the derivative of the sum."""
+        return at.by_passing((at.joints.points.pair == self.contact).astype(float))
+
+
+@dataclass(frozen=True)
+@checked()
+class JointResistance(HeatOfContact):
+    """The mean jump of the temperature at a contact over the heat that passes, [degree / power]."""
+
+    def value(self, at: AtTemperatures) -> float:
+        """Return the resistance."""
+        slave, master = at.joints.sides(at.values)
+        return float(self._share(at) @ (slave - master)) / super().value(at)
+
+    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
+        """Return the derivative of the quotient."""
+        jump = at.joints.points.jump.T @ self._share(at)
+        return np.asarray((jump - self.value(at) * super().by_temperature(at)) / super().value(at))
+
+    def _share(self, at: AtTemperatures) -> np.ndarray:
+        area = np.where(at.joints.points.pair == self.contact, at.joints.area, 0.0)
+        return area / area.sum()
