@@ -102,6 +102,8 @@ class Assembly:
         part.place()
         nodes = part.mesh.nodes
         acting = {k: load for k, load in enumerate(scene.loads) if load.body == part.mesh.body}
+        # Loads of other times are forgotten: each may be a new one.
+        self._known = {load: self._known[load] for load in acting.values() if load in self._known}
         exchanges = {k: self._exchange(load, temperature[nodes]) for k, load in acting.items()}
         stored = self._stored(rate, temperature[nodes], rate.before[nodes], number)
         bed = sum((each.matrix for each in exchanges.values()), stored.matrix)

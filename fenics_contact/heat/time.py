@@ -289,6 +289,8 @@ def _history(steps: _Steps, tracks: Sequence[_Track], ends: Sequence[float], *, 
 def _at_start(scene: HeatScene, given: Any) -> np.ndarray:
     """Return temperatures of the nodes of all bodies, (n_nodes,), if these can store heat."""
     found, given = [], getattr(given, "temperature", given)
+    for name in given if isinstance(given, Mapping) else ():
+        check_known(name, scene.bodies, f"initial names body {name!r}, the scene has")
     for name, body in scene.bodies.items():
         words, count, mine = f"the initial temperature of body {name!r}", body.mesh.n_nodes, given
         if any(each.heat_capacity is None for each in body.materials):

@@ -272,6 +272,7 @@ COLD = HeatScene({"slab": ConductingBody(SLAB.mesh, Conductor(1.0))})
         (HELD, {"begin": 0}, "begin must be at least 1 and outputs lie above 0 and up to 4, got 0 and"),
         (HELD, {"outputs": (5.0,)}, r"up to 4, got 1 and \(5.0,\): correct them"),
         (HELD, {"initial": {"slab": np.ones(3)}}, "the initial temperature of body 'slab' must be a finite"),
+        (HELD, {"initial": {"slap": 1.0}}, r"initial names body 'slap', the scene has \['slab'\]"),
         (HELD, {"initial": {}}, "initial must have body 'slab', it has none: add it"),
         (lambda t: HELD if t < 0.5 else OTHER, {}, "a scene must have the same bodies at all times, got"),
     ],
