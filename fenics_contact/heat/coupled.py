@@ -103,7 +103,7 @@ class _Passes:
             else:
                 guess = anderson.next(guess, guess + change)
             large = np.linalg.norm(change) > 1e-3 * np.linalg.norm(self.known[0][1])
-            if large and len(self.known) % 10 == 0 and any(change @ r < 0.0 for _, r in self.known[-6:]):
+            if large and len(self.known) == 10 and any(change @ r < 0.0 for _, r in self.known[-6:]):
                 anderson, guess = Anderson(), self._between()
         if self.answers:
             return self.answers[0]
@@ -172,9 +172,9 @@ class _Passes:
         return change
 
     def _between(self, halvings: int = 16) -> np.ndarray:
-        """Return temperatures between two passes with opposite changes, where these are small. Collective.
+        """Return temperatures between two passes with opposite changes, the last ones tried. Collective.
 
-        Raises where changes stay large however close the temperatures are: there the conductance jumps.
+        Raises where changes stay large and opposite however close the temperatures: there conductance jumps.
         """
         low, down = self.known[-1]
         high, up = next((x, r) for x, r in reversed(self.known) if r @ down < 0.0)
@@ -188,6 +188,8 @@ class _Passes:
                 low, down = guess, change
             else:
                 high, up = guess, change
+        if down @ up > 0.0 or np.abs(low - high).max() > 1e-3 * min(np.abs(down).max(), np.abs(up).max()):
+            return guess
         found = (self.joints.sides(x + r)[0].max() for x, r in ((low, down), (high, up)))
         raise ConvergenceError(
             "there is no steady state: bodies that touch cool until they part, and warm until they touch "

@@ -361,3 +361,24 @@ def test_a_sphere_that_turns_on_a_large_body_heats_it_as_jaeger_says():
     assert found == pytest.approx(exact, rel=0.01)
     assert state.heat.balance.by_part[f"FrictionHeat {rubbed.place}"] == pytest.approx(0.2 * slip * force)
     assert state.heat.balance.error < 1e-11
+
+
+@pytest.mark.slow
+def test_a_film_that_is_steep_but_continuous_has_a_state_where_surfaces_curve():
+    # Passes alternate by more than twice their changes, at many points: no steady state lies on a line.
+    ticks = np.concatenate([np.linspace(0.0, 2.8, 29), np.geomspace(2.8, 20.0, 12)[1:]])
+    cold, top = RigidSphere((0.0, 50.0), 50.0), Surface("body", "y1")
+    material = IsotropicElasticity(1000.0, 0.3, thermal_expansion=1e-4)
+    body = Body(rectangle_lattice([ticks, -ticks[::-1]]), material, axisymmetric=True)
+    lifted = Support("body", "y0", (None, 0.06))
+    scene = Scene({"body": body}, [lifted], contacts=[ContactPair(top, cold)])
+    law = PressureConductance(1.0, 1.0) + GapConductance(1e-5, least_gap=0.01, curved=False)
+    joint = ThermalContact(top, cold, law, temperature=-100.0)
+    held = [HeldTemperature("body", "y0", 0.0)]
+    heat = HeatScene.on(scene, {"body": Conductor(0.05)}, held=held, contacts=[joint])
+    state = solve_heated(scene, heat, MPI.COMM_SELF)
+    contact, (film_there,) = state.mechanics.contact, state.heat.contacts
+    expected = contact.pressure + 1e-5 / (np.maximum(contact.gap, 0.0) + 0.01)
+    assert film_there.conductance == pytest.approx(expected, rel=1e-9)
+    assert 10 < (contact.normal_force > 0.0).sum() < 20
+    assert state.heat.balance.error < 1e-11
