@@ -40,7 +40,14 @@ from fenics_contact.heat import (
     solve_heated,
 )
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.output import read_result, write_contact_table, write_frd, write_heat_balance, write_xdmf
+from fenics_contact.output import (
+    ResultSeries,
+    read_result,
+    write_contact_table,
+    write_frd,
+    write_heat_balance,
+    write_xdmf,
+)
 from fenics_contact.pictures import Units, plot_field, plot_stress
 from fenics_contact.pictures.canvas import LEVEL_MAP
 from fenics_contact.pictures.section import field_entries
@@ -117,6 +124,15 @@ def test_files_for_paraview_have_all_fields(tmp_path: Path):
     assert mesh.cell_data["heat_flux"][0] == pytest.approx(np.tile([0, 0, -0.1], (16, 1)), abs=1e-10)
     files = write_xdmf(plates(), tmp_path / "heat.xdmf")
     assert 'Name="temperature"' in files["lower"].read_text()
+
+
+def test_states_in_time_are_a_series_for_paraview(tmp_path: Path):
+    series = ResultSeries(tmp_path, "warming", MPI.COMM_SELF, formats=["xdmf"])
+    for time, state in ((0.0, strip()), (1.5, strip())):
+        series.add(state, time)
+    assert [member.value for member in series.members] == [0.0, 1.5]
+    mesh = meshio.read(tmp_path / "warming" / "warming_0001_block.vtu")
+    assert mesh.point_data["temperature"].max() == pytest.approx(100.0)
 
 
 def test_frd_files_have_temperature_and_flux(tmp_path: Path):
