@@ -123,7 +123,7 @@ class HeatDeck:
     def statics(self, states: Sequence[HeatState]) -> Deck:
         """Return the deck of the steps in which bodies move, at the temperatures of states.
 
-        Steps with both procedures, and *STATIC, have the temperatures of the last step that conducts heat,
+        Steps with both procedures, and ``*STATIC``, have the temperatures of the last step that conducts heat,
         reached along a line. Heat does not depend on the deformation.
 
         Args:
@@ -149,7 +149,7 @@ class HeatDeck:
 
 @naming_arguments
 def read_heat_deck(path: str | Path, comm: MPI.Comm | None = None) -> HeatDeck:
-    """Read a deck whose steps are all *HEAT TRANSFER.
+    """Read a deck whose steps are all ``*HEAT TRANSFER``.
 
     Elements of heat (DC3D8, ...) and of mechanics (C3D8, ...) conduct alike, integrated in full. What holds
     and loads bodies mechanically is left out, which the notes say.

@@ -54,7 +54,7 @@ class Conductance(ABC):
     by_temperature = False
     #: Whether it depends on pressures or gaps, which mechanics may change.
     by_contact = True
-    #: Temperatures must lie above it.
+    # Temperatures must lie above it.
     absolute_zero: float = -inf
 
     @abstractmethod

@@ -47,7 +47,7 @@ class HeatPart(ABC):
     gives_temperature = False
     #: A temperature that it was given, not a number where it has none.
     level: Value = nan
-    #: Temperatures must lie above it.
+    # Temperatures must lie above it.
     absolute_zero: float = -inf
 
     def check(self, meshes: Mapping[str, BodyMesh]) -> None:
