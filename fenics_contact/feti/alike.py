@@ -222,7 +222,7 @@ class Kinds:
     def _turns(self, first: Kind, given: Kind) -> Iterator[np.ndarray]:
         """Yield orthogonal Q with x_first = Q x about the centroids that reference nodes suggest."""
         dim = first.arms.shape[1]
-        if given.width != dim:  # of revolution, with torsion: components are not those of the plane
+        if given.width not in (1, dim):  # of revolution, with torsion: components are not those of the plane
             yield np.eye(dim)
             return
         near = self._agreement.marks

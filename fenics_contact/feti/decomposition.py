@@ -78,12 +78,6 @@ class Tearing(NodeNumbers):
             np.add.reduceat(self.copy_stiffness, self.first_copy[:-1]), self.multiplicity
         )
 
-    @property
-    def with_shares(self) -> Tearing:
-        """Itself, with what follows from it: held once a machine, too."""
-        _ = self.copy_share, self.on_several_ranks
-        return self
-
     @cached_property
     def on_several_ranks(self) -> np.ndarray:
         """Whether subdomains of different ranks share a node, shape (n_nodes,)."""
@@ -453,23 +447,22 @@ class Decomposition:
         return replace(self, gluing=_glued(self.tearing, fixed, axes, dependent, self.comm))
 
     def weighted(self, scene: Scene, stiffness: np.ndarray, near: float = 2.0) -> Decomposition:
-        """Return the subdomains with other typical stiffnesses of copies, relative to the same. Collective.
+        """Return the subdomains with other typical stiffnesses of copies, and rows for them. Collective.
 
-        Itself where none has changed by more than a factor ``near``: else gluing rows are made anew.
-        `stiffness`: that of each block of this rank's torn vectors.
+        Itself where none changes by more than a factor ``near``. `stiffness`: of each block of this rank.
         """
         here, block = self.held
         every = np.zeros(len(self.tearing.copy_subdomain))
         every[here] = stiffness[block]
-        every = np.asarray(self.comm.allreduce(every))
-        change = every / self.tearing.copy_stiffness
+        change = (every := np.asarray(self.comm.allreduce(every))) / self.tearing.copy_stiffness
         if max(change.max(), 1.0 / change.min()) <= near:
             return self
-        tearing = once_a_machine(self.comm, lambda: replace(self.tearing, copy_stiffness=every).with_shares)
+        tearing = once_a_machine(self.comm, lambda: replace(self.tearing, copy_stiffness=every))
         with together(self.comm):
             dependent = dependent_nodes(scene, tearing)
-        gluing = _glued(tearing, self.fixed, self.axes, dependent, self.comm)
-        return replace(self, tearing=tearing, gluing=gluing)
+        return replace(
+            self, tearing=tearing, gluing=_glued(tearing, self.fixed, self.axes, dependent, self.comm)
+        )
 
 
 def decompose(
@@ -527,7 +520,9 @@ def _torn(
 ) -> Tearing:
     """Cut the bodies, see `tear`, and compute what follows from the cuts alone."""
     rank = _dealt(scene, partitions, counted, ranks)
-    return tear(scene, partitions, rank, cell_stiffness(scene, forms)).with_shares
+    tearing = tear(scene, partitions, rank, cell_stiffness(scene, forms))
+    _ = tearing.copy_share, tearing.on_several_ranks  # which stay with it: held once a machine, too
+    return tearing
 
 
 def _fixed(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalAxes]:

@@ -62,7 +62,7 @@ class Motion(Placement):
     def of(cls, nodes: np.ndarray, Q: np.ndarray, components: int) -> Motion:
         """Return that by an orthogonal Q, shape (dim, dim), where ``nodes`` lie on the first one's, (n,)."""
         along, sign = np.arange(components), np.ones(components)
-        whole = np.array_equal(Q, np.round(Q))
+        whole = components == 1 or np.array_equal(Q, np.round(Q))
         if whole and components == len(Q):
             along = np.abs(Q).argmax(axis=1)
             sign = Q[np.arange(components), along]

@@ -53,12 +53,12 @@ class CautiousAnderson(Anderson):
     def __init__(self, depth: int) -> None:
         """Combine the last guess with that many before it."""
         super().__init__(depth)
-        self._share, self.change, self.rate = 1.0, np.inf, 0.0
+        self._share, self.change, self.rate = 1.0, 0.0, 0.0
 
     def next(self, guess: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Return the next guess after g(guess) was found, shape (n,) each."""
-        change = float(np.abs(found - guess).max())
-        self.change, self.rate = change, change / self.change if self.change else 0.0
+        before, self.change = self.change, float(np.abs(found - guess).max())
+        self.rate = self.change / before if before else 1.0
         self._share = 0.5 * self._share if self.rate > 1.0 else min(1.0, 1.2 * self._share)
         if self.rate > 1.0:
             self._found.clear()

@@ -110,9 +110,8 @@ class AtTemperatures:
                     total = total + load.beyond(part, temperature, along)  # type: ignore[union-attr]
             return part.mesh.following.force(total)
 
-        return (
-            self._summed(of_part) + self._by_law(self.joints.points.jump @ weight) - self._by_friction(weight)
-        )
+        through = self._by_law(self.joints.points.jump @ weight) - self._by_friction(weight)
+        return self._summed(of_part) + through
 
     def _by_friction(self, weight: np.ndarray) -> np.ndarray:
         """Return the derivative by temperatures of the heat of friction, with weights of nodes, (n_nodes,)."""

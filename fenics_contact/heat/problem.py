@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Any, ClassVar
 
 import numpy as np
@@ -114,9 +115,8 @@ class HeatProblem:
         stiffness = np.empty(len(block))
         stiffness[block] = self._stiffness[here]
         stiffness *= np.concatenate([np.zeros(0), *(each.stiffened for each in heated)])
-        weighted = decomposition.weighted(self.scene.field, stiffness)
-        self._decomposition = weighted
-        return weighted
+        self._decomposition = decomposition.weighted(self.scene.field, stiffness)
+        return self._decomposition
 
     @property
     def no_rate(self) -> Rate:
@@ -183,31 +183,34 @@ class _Iteration:
     def run(
         self, last: HeatState | None, most: int, settled: float = 1e-10, loosest: float = 1e-3
     ) -> HeatState:
-        guess, anderson, products = (
-            self._first(last),
-            CautiousAnderson(1 if self.scene.only_films_vary else 5),
-            0,
-        )
-        full, linear, floor = self.problem.tolerance, self.scene.is_linear, self.scene.absolute_zero
+        guess, anderson, products = self._first(last), self._anderson, 0
+        full, linear, floor = self.problem.tolerance, self.scene.is_linear, -inf
+        for part in (*self.scene.loads, *(each.law for each in self.scene.contacts)):
+            floor = max(floor, part.absolute_zero)
         tolerance = full if linear else max(full, loosest)
         for count in range(1, most + 1):
             state = self._linear(guess, last, tolerance, (count, products))
             products, last = state.products, state
             size = np.abs(state.values - self._level(state.values)).max()
             following = anderson.next(guess, state.values)
-            change = anderson.change
-            left = change * min(anderson.rate, 1.0)
+            left = anderson.change * min(max(anderson.rate, 0.05), 1.0)
             # Even temperatures change by nothing but what linear systems leave.
             enough = max(settled * size, full * np.abs(state.values).max())
             if tolerance <= full and (linear or left <= enough):
                 return state
             # What a step changes is known to a thousandth; the last system is solved in full.
-            tolerance = full if left <= enough else min(max(full, 1e-3 * change / size), loosest)
+            share = anderson.change / max(size, anderson.change)
+            tolerance = full if left <= enough else min(max(full, 1e-3 * share), loosest)
             guess = np.maximum(following, guess - 0.7 * (guess - floor))
         raise ConvergenceError(
-            f"temperatures do not settle, they change by {change:.2g} of {size:.2g} after {most} systems: "
-            "start from a state nearby, or make steps of the loads"
+            f"temperatures do not settle, they change by {anderson.change:.2g} of {size:.2g} after {most} "
+            "systems: start from a state nearby, or make steps of the loads"
         )
+
+    @property
+    def _anderson(self) -> CautiousAnderson:
+        """Steps are Newton's where films alone vary."""
+        return CautiousAnderson(1 if self.scene.only_films_vary else 5)
 
     def _first(self, last: HeatState | None) -> np.ndarray:
         """Return temperatures from which to start: the last ones, those before, or held and ambient ones."""
@@ -248,31 +251,26 @@ class _Iteration:
             field = system.displacement(solution.multiplier, solution.alpha)
             products = counts[1] + system.products
             if tolerance <= problem.tolerance < 100.0 * reachable:
-                rough = max(1e-4, reachable)
-                solution, field, more = self._refined(system, solution, field, heated, rough)
+                solved = system, solution, field, heated
+                solution, field, more = self._refined(*solved, rough=max(1e-4, reachable))
                 products += more
         return self._state(system, solution, field, heated, conductance, friction, (counts[0], products))
 
     def _refined(
-        self,
-        system: DualSystem,
-        solution: DualSolution,
-        field: np.ndarray,
-        heated: tuple[Heated, ...],
-        rough: float,
-    ) -> tuple[DualSolution, np.ndarray, int]:
+        self, system: DualSystem, solution: DualSolution, field: np.ndarray,
+        heated: Sequence[Heated], rough: float,
+    ) -> tuple[DualSolution, np.ndarray, int]:  # fmt: skip
         """Return a solution without what rounding leaves in means of subdomains, and products. Collective.
 
-        Heat that is given and not taken, and jumps, are computed without that and drive corrections, with
-        residuals of ``rough``.
+        Heat and jumps that are missing drive corrections, with residuals of ``rough``.
         """
         torn, products = system.torn, 0
         for _ in range(self.refinements):
-            passing = system.force(solution.multiplier)
-            parts = zip(heated, self.decomposition.parts, strict=True)
-            loads = [each.residual(field[part]) - passing[part] for each, part in parts]
-            own = zip(torn.subdomains, loads, strict=True)
-            subdomains = tuple(replace(subdomain, load=load) for subdomain, load in own)
+            passing, parts = system.force(solution.multiplier), self.decomposition.parts
+            subdomains = tuple(
+                replace(each.subdomain, load=each.residual(field[part]) - passing[part])
+                for each, part in zip(heated, parts, strict=True)
+            )
             right = torn.right - torn.compliance.added(system.jump(field), -solution.multiplier)
             following = DualSystem(replace(torn, subdomains=subdomains, right=right), previous=system)
             step = solve_dual(following, ProjectedCG(tolerance=rough))
@@ -281,8 +279,8 @@ class _Iteration:
             multiplier, alpha = solution.multiplier + step.multiplier, solution.alpha + step.alpha
             solution = replace(solution, multiplier=multiplier, alpha=alpha)
             sizes = np.array([np.abs(each).max(initial=0.0) for each in (change, field)])
-            changed, size = self.decomposition.comm.allreduce(sizes, op=MPI.MAX)
-            if 10.0 * rough * changed <= 1e-12 * size:
+            changed, size = torn.numbering.comm.allreduce(sizes, op=MPI.MAX)
+            if rough * changed <= 1e-13 * size:
                 break
         return solution, field, products
 

@@ -46,8 +46,8 @@ class Property(ABC):
 
     #: What forms depend on.
     kind: Hashable = "field"
-    #: Whether it may depend on the temperature.
-    varies = True
+    #: Whether it may depend on the temperature, and on coordinates.
+    varies, by_place = True, False
     #: Values of the constants of its form.
     numbers: tuple[float, ...] = ()
 
@@ -174,6 +174,7 @@ class Written(Property):
 class ByUfl(Written):
     """UFL of coordinates and temperature, evaluated at the points of the quadrature."""
 
+    by_place = True
     name: str
     given: Ufl
 
@@ -365,6 +366,11 @@ class Conductor:
         found = property_of(name, given, remedy)
         # At nodes, where means over temperatures store the heat of the table exactly.
         return (ByFunction(name, found.at) if isinstance(found, TemperatureTable) else found,)
+
+    @property
+    def by_place(self) -> bool:
+        """Whether a property may depend on coordinates."""
+        return any(each.by_place for each in (*self.tensor.ravel(), *self.capacities))
 
     @property
     def is_linear(self) -> bool:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, isnan, nan
+from math import isnan, nan
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -399,12 +399,6 @@ class HeatScene:
         given = [each.value for each in self.held]
         given += [each.level for each in self.loads] + [each.temperature for each in self.contacts]
         return tuple(each for each in given if not callable(each) and not isnan(each))
-
-    @property
-    def absolute_zero(self) -> float:
-        """The highest absolute zero that a part was given, −∞ where nothing radiates."""
-        parts = (*self.loads, *(each.law for each in self.contacts))
-        return max((each.absolute_zero for each in parts), default=-inf)
 
     @property
     def only_films_vary(self) -> bool:

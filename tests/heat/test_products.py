@@ -136,3 +136,13 @@ def test_products_do_not_grow_in_the_plane_or_in_slabs(step: float):
     assert more <= few + 1
     few, more = (solved(boxes(n, 2, 2, held=True), step).products for n in (8, 54))
     assert more <= few + 3
+
+
+def test_equal_subdomains_share_factors_turned_and_mirrored_ones_too():
+    # Corners, edges, faces and the inside of a cube; by chance equal roundings of zero: up to 27.
+    assert solved(boxes(4, 4, 4, held=True)).system.kinds == 4
+    assert solved(boxes(4, 4, cells=5, held=True)).system.kinds == 3
+    one = solved(boxes(3, 3, 3, held=True), 0.1)
+    other = HeatProblem(boxes(3, 3, 3, held=True)[0], MPI.COMM_SELF).solve
+    assert one.system.kinds == 4
+    assert other().values == pytest.approx(solved(boxes(3, 3, 3, held=True)).values, abs=1e-9)
