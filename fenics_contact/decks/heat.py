@@ -123,8 +123,8 @@ class HeatDeck:
     def statics(self, states: Sequence[HeatState]) -> Deck:
         """Return the deck of the steps in which bodies move, at the temperatures of states.
 
-        Steps with both procedures, and ``*STATIC``, have the temperatures of the last step that conducts heat,
-        reached along a line. Heat does not depend on the deformation.
+        Steps with both procedures, and ``*STATIC``, have the temperatures of the last step that conducts
+        heat, reached along a line. Heat does not depend on the deformation.
 
         Args:
             states: The state at the end of each step that conducts heat.
