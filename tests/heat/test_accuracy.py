@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 
 from fenics_contact.heat import Convection, HeatProblem, HeatState
 from fenics_contact.heat.assembly import Rate
-from tests.heat.test_products import Cut, boxes
+from tests.heat.bodies import Cut, boxes
 
 
 def filmed(coefficient: float, *, held: bool = False) -> Cut:
