@@ -114,7 +114,7 @@ class AtTemperatures:
         return self._summed(of_part) + through
 
     def _by_friction(self, weight: np.ndarray) -> np.ndarray:
-        """Return the derivative by temperatures of the heat of friction, with weights of nodes, (n_nodes,)."""
+        """Return the derivative by temperatures of friction heat, with weights of nodes, (n_nodes,)."""
         joints, points = self.joints, self.joints.points
         touch = joints.touch(self.values, joints.pressure, points.gap)
         none, along = np.zeros(points.count), np.stack([points.own @ weight, points.master @ weight])

@@ -68,10 +68,12 @@ def check(make: Callable[[np.ndarray], HeatScene], wanted: list[HeatObjective], 
 ALL = list(range(len(START)))
 
 
+@pytest.mark.claim
 def test_derivatives_are_those_of_differences_with_laws_by_temperature() -> None:
     check(lambda p: scene(p, laws=True), objectives(2, "film")[1:4:2], [0, 3, 4, 5])
 
 
+@pytest.mark.claim
 @pytest.mark.parametrize(
     "joint", ["tie", *(pytest.param(joint, marks=pytest.mark.slow) for joint in ("film", "node", "obstacle"))]
 )

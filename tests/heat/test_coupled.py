@@ -94,6 +94,7 @@ def test_a_rod_that_cools_where_it_touches_has_one_state():
         assert state.gain < 0.0
 
 
+@pytest.mark.claim
 def test_a_rod_that_warms_where_it_touches_has_the_state_that_its_start_leads_to():
     apart, between, touching = ends(30.0, 0.02, 0.0, 100.0, 0.035)
     bodies, heat = rod(film(30.0, 0.02), 0.0, 100.0, 0.035)
@@ -105,6 +106,7 @@ def test_a_rod_that_warms_where_it_touches_has_the_state_that_its_start_leads_to
         assert 0.0 < state.gain < 1.0
 
 
+@pytest.mark.claim
 def test_a_rod_that_loses_all_conductance_as_it_parts_has_no_state():
     # Closed, the end is at 100/6 and the mean too cold to touch; open, at 100 and too warm to part.
     bodies, heat = rod(ConductanceTable((0.0,), (5.0,)), 100.0, 0.0, 0.08)
@@ -226,6 +228,7 @@ def rubbed_rod(speed: float) -> tuple[Scene, HeatScene]:
     return scene, replace(heat, contacts=[replace(joint, conductance=1e-9, friction=rubbing)])
 
 
+@pytest.mark.claim
 def test_friction_heats_what_presses_harder_up_to_a_critical_speed():
     # p = E (δ + α T / 2) with T = μ v p / k at the end: p = E δ / (1 − v / v_c), v_c = 2 k / (E α μ) = 8.
     scene, heat = rubbed_rod(6.0)

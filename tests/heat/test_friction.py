@@ -104,6 +104,7 @@ def test_an_obstacle_keeps_its_share():
     assert state.balance.by_part["FrictionHeat block y0 - RigidPlane"] == pytest.approx(1.5)
 
 
+@pytest.mark.claim
 def test_large_bodies_share_by_effusivities_from_the_first_moment():
     # 2 q √(t/π) / (e₁ + e₂) on both sides (Carslaw and Jaeger, 2.9): forty steps of Euler's rule.
     share, heat, steps = effusivity_share(PAD, DISC), 0.4 * 5.0 * 7.0, 40

@@ -96,6 +96,7 @@ def test_radiation_far_from_the_start_stays_above_absolute_zero(
     assert state.balance.error < 1e-12
 
 
+@pytest.mark.claim
 def test_a_conductivity_that_grows_a_hundredfold_has_kirchhoffs_flux():
     mesh = rectangle((0.0, 0.0), (1.0, 0.1), (200, 2))
     held = [HeldTemperature("bar", "x0", 300.0), HeldTemperature("bar", "x1", 1500.0)]

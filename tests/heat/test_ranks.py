@@ -36,6 +36,7 @@ def test_all_ranks_and_cuts_find_the_same_temperatures(kind: str, ranks: int):
     assert together[:, 2].max() < 1e-12
 
 
+@pytest.mark.claim
 def test_ranks_refuse_a_law_of_one_rank_together(mpirun: Callable[..., str]):
     lines = mpirun(SCRIPT, 2, "refused").splitlines()
     assert len(lines) == 2

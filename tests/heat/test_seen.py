@@ -265,6 +265,7 @@ write_contact_table(state, "out/contact.csv")
 """
 
 
+@pytest.mark.claim
 def test_files_are_the_same_on_two_ranks(
     mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -85,6 +85,7 @@ def test_slabs_are_those_of_carslaw_and_jaeger(
     assert fine < (0.15, 0.02)[order - 1]
 
 
+@pytest.mark.claim
 def test_steps_that_change_keep_the_second_order():
     found = []
     for count in (16, 32):
@@ -95,6 +96,7 @@ def test_steps_that_change_keep_the_second_order():
     assert np.log2(found[0] / found[1]) == pytest.approx(2.0, abs=0.15)
 
 
+@pytest.mark.claim
 @pytest.mark.parametrize(
     ("scheme", "tolerance"), [("bdf2", 0.05), pytest.param("euler", 0.3, marks=pytest.mark.slow)]
 )
@@ -115,6 +117,7 @@ def test_the_error_of_the_whole_history_is_stated_and_held(scheme: Any, toleranc
     assert "error by steps" in str(result)
 
 
+@pytest.mark.claim
 def test_outputs_are_hit_and_kept_alone():
     given = (0.7, 2.0, 1.3)
     result = history(HELD, 2.5, tolerance=2.0, outputs=given)
@@ -170,6 +173,7 @@ def test_heat_of_an_interface_is_shared_by_effusivities():
     assert joined.states[-1].ties.sum() == pytest.approx(6.0 * 0.05, rel=1e-3)
 
 
+@pytest.mark.claim
 def test_a_band_source_that_moves_is_jaegers():
     # Half-width 1, k = α = 1, v = 2, so that Jaeger's L = v l / (2 α) is 1; edges lie between nodes.
     h, speed, first = 1.0 / 4.5, 2.0, 13 / 4.5
@@ -196,6 +200,7 @@ def test_a_band_source_that_moves_is_jaegers():
     assert result.balance.stored == pytest.approx(2.0 * end, rel=1e-10)
 
 
+@pytest.mark.claim
 def test_heat_is_balanced_with_capacities_by_temperature():
     # A body of one temperature whose heat is T + T²/2: what enters, 0.3 t, says which.
     capacity = TemperatureTable((0.0, 100.0), (1.0, 101.0))
@@ -209,6 +214,7 @@ def test_heat_is_balanced_with_capacities_by_temperature():
         assert all(state.balance.error < 1e-12 for state in result.states)
 
 
+@pytest.mark.claim
 def test_loads_that_change_with_time_heat_as_they_do_in_closed_form():
     # c L T' = −h (T − Tₐ(t)) of a thin wall, Tₐ = sin t.
     body = ConductingBody(rectangle((0, 0), (0.5, 1), (1, 1)), Conductor(1e4, 4.0))
@@ -312,6 +318,7 @@ if MPI.COMM_WORLD.rank == 0:
 """
 
 
+@pytest.mark.claim
 @pytest.mark.parametrize(
     ("how", "ranks"),
     [("step=0.05", (1, 2)), pytest.param("tolerance=0.1", (1, 2, 4), marks=pytest.mark.slow)],
