@@ -7,7 +7,7 @@ from functools import reduce
 from operator import add
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
-from pydantic import Field, PositiveFloat
+from pydantic import Field, PositiveFloat, PositiveInt
 
 from fenics_contact._scene_file import document
 from fenics_contact._scene_file.bodies import AnyMaterial
@@ -28,7 +28,6 @@ from fenics_contact.heat import conductance, parts
 from fenics_contact.heat.friction import FrictionHeat
 from fenics_contact.heat.properties import Conductor, TemperatureTable
 from fenics_contact.heat.scene import ThermalContact
-from fenics_contact.heat.time import heat_in_time
 
 IN_FILES.append((parts.Value, ScalarField, "; in quotes a formula in x, y, z, or a field from a file"))
 _Table: Any = table_of(TemperatureTable, temperature=Numbers, value=Numbers)
@@ -130,10 +129,11 @@ _SCHEME = Annotated[
 ]
 
 
-@keys_of(heat_in_time, only=("duration", "begin"))
 class TimePart(Part):
     """Temperatures over time, by steps of one length or of a given error."""
 
+    duration: PositiveFloat = Field(description="until when, from zero on, [time]")
+    begin: PositiveInt = Field(1, description="number of steps of Euler's rule at the start")
     initial: either(dict, dict[str, ScalarField], float) = Field(  # type: ignore[valid-type]
         description="temperature at the start, or by body, in degrees"
     )

@@ -100,7 +100,7 @@ def heat_adjoint(
 
     Example:
         >>> found = heat_adjoint(state, TemperatureMean("chip"))  # doctest: +SKIP
-        >>> found.gradient(lambda p: scene_of(film=p[0], power=p[1]), [2e-3, 15.0])  # doctest: +SKIP
+        >>> found.gradient(build, [2e-3, 15.0])  # build(p): the scene of variables  # doctest: +SKIP
     """
     decomposition = state.torn.decomposition
     at = AtTemperatures.of(state.scene, decomposition, state.values)

@@ -242,7 +242,9 @@ class _Iteration:
         system = DualSystem(torn, timer, previous=None if last is None else last.system)
         with timer.phase("solve"):
             start = None
-            if last is not None and last.torn.numbering is torn.numbering:
+            warm = self.scene.is_linear or tolerance > problem.tolerance
+            # A warm start leaves in the balance what an earlier system had left.
+            if warm and last is not None and last.torn.numbering is torn.numbering:
                 start = last.solution.multiplier
             # The least residual that rounding leaves where films and storage hardly hold a subdomain.
             own = [each.subdomain.typical_stiffness / each.even.sum() for each in heated if each.even.any()]

@@ -131,14 +131,19 @@ from fenics_contact.heat import (
     HeatAtNodes,
     HeatedState,
     HeatFlux,
+    HeatOfContact,
+    HeatOfHeld,
     HeatProblem,
     HeatScene,
     HeatSource,
     HeldTemperature,
+    JointResistance,
     PressureConductance,
     Radiation,
+    TemperatureMean,
     TemperatureTable,
     ThermalContact,
+    heat_adjoint,
     heat_in_time,
 )
 from fenics_contact.materials import (
@@ -182,7 +187,7 @@ MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
     "ClosureLaw", "Conductance", "Elasticity", "EnergyModel", "FrictionCurve", "WearCurve",
-    "HistoryMaterial", "Hyperelasticity", "Inexact", "Kinked", "Material",
+    "HeatObjective", "HistoryMaterial", "Hyperelasticity", "Inexact", "Kinked", "Material",
     "NearlyIncompressible", "Objective", "MaxFunction", "Resumable", "RigidObstacle", "State", "SurfaceShape",
     "Thermoelastic", "Transverse", "Weighable",
 }  # fmt: skip
@@ -301,7 +306,8 @@ def heated(contact: ContactProblem, state: AnyState) -> list[Any]:
         GapConductance(1.0, 0.1), GapRadiation(0.5, 0.5), TemperatureTable((0.0, 1.0), (1.0, 2.0)),
         FrictionHeat(0.3, lambda x: x[:, 0]), Radiation("a", "z0", 0.9, 300.0),
         Convection("a", "z0", TemperatureTable((0.0, 1.0), (1.0, 2.0)), 20.0), HeatSource("a", 1.0),
-        HeatAtNodes("a", "z0", 1.0),
+        HeatAtNodes("a", "z0", 1.0), heat_adjoint(warm, TemperatureMean("plate 0")),
+        HeatOfContact(0), HeatOfHeld("plate 0", "z0"), JointResistance(0),
     ]  # fmt: skip
 
 
