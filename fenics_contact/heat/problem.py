@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from math import inf
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from fenics_contact._base.shared import once_a_machine
 from fenics_contact._pairing.points import join_points
 from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively, together
 from fenics_contact.feti.all_rows import RowGroups
-from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
 from fenics_contact.feti.decomposition import Decomposition, decompose, prescribed_along
 from fenics_contact.feti.dual import DualSystem
@@ -32,9 +31,9 @@ from fenics_contact.heat.joints import Joints
 from fenics_contact.heat.plausible import odd_values, warn_of
 from fenics_contact.heat.rows import ConductingRows
 from fenics_contact.heat.scene import HeatScene
-from fenics_contact.heat.state import HeatBalance, HeatState, HeatThroughContact
+from fenics_contact.heat.solved import Solved, refined
+from fenics_contact.heat.state import HeatState
 from fenics_contact.qp.face_newton import ProjectedCG
-from fenics_contact.qp.solution import DualSolution
 from fenics_contact.results.dual_solve import solve_dual
 
 #: Largest relative residual of a linear system.
@@ -177,8 +176,6 @@ class _Iteration:
     joints: Joints
     rate: Rate
     given: GivenContact
-    #: Corrections of a solution at most, see `_refined`; each leaves a thousandth of an error or less.
-    refinements: ClassVar[int] = 4
 
     def run(
         self, last: HeatState | None, most: int, settled: float = 1e-10, loosest: float = 1e-3
@@ -253,38 +250,10 @@ class _Iteration:
             field = system.displacement(solution.multiplier, solution.alpha)
             products = counts[1] + system.products
             if tolerance <= problem.tolerance < 100.0 * reachable:
-                solved = system, solution, field, heated
-                solution, field, more = self._refined(*solved, rough=max(1e-4, reachable))
+                solution, field, more = refined(system, solution, field, heated, max(1e-4, reachable))
                 products += more
-        return self._state(system, solution, field, heated, conductance, friction, (counts[0], products))
-
-    def _refined(
-        self, system: DualSystem, solution: DualSolution, field: np.ndarray,
-        heated: Sequence[Heated], rough: float,
-    ) -> tuple[DualSolution, np.ndarray, int]:  # fmt: skip
-        """Return a solution without what rounding leaves in means of subdomains, and products. Collective.
-
-        Heat and jumps that are missing drive corrections, with residuals of ``rough``.
-        """
-        torn, products = system.torn, 0
-        for _ in range(self.refinements):
-            passing, parts = system.force(solution.multiplier), self.decomposition.parts
-            subdomains = tuple(
-                replace(each.subdomain, load=each.residual(field[part]) - passing[part])
-                for each, part in zip(heated, parts, strict=True)
-            )
-            right = torn.right - torn.compliance.added(system.jump(field), -solution.multiplier)
-            following = DualSystem(replace(torn, subdomains=subdomains, right=right), previous=system)
-            step = solve_dual(following, ProjectedCG(tolerance=rough))
-            change = following.displacement(step.multiplier, step.alpha)
-            field, products = field + change, products + following.products
-            multiplier, alpha = solution.multiplier + step.multiplier, solution.alpha + step.alpha
-            solution = replace(solution, multiplier=multiplier, alpha=alpha)
-            sizes = np.array([np.abs(each).max(initial=0.0) for each in (change, field)])
-            changed, size = torn.numbering.comm.allreduce(sizes, op=MPI.MAX)
-            if rough * changed <= 1e-13 * size:
-                break
-        return solution, field, products
+        solved = Solved(self.scene, self.joints, heated, system, solution, field, conductance, friction)
+        return solved.state(counts[0], products, timer.seconds)
 
     def _heated(self, guess: np.ndarray, friction: np.ndarray) -> Iterator[Heated]:
         tearing = self.decomposition.tearing
@@ -314,106 +283,6 @@ class _Iteration:
         free = free_motions(scene, decomposition.tearing)
         subdomains = tuple(each.subdomain for each in heated)
         return at_rest(scene, decomposition, subdomains, rows, prescribed, free)
-
-    def _state(
-        self,
-        system: DualSystem,
-        solution: DualSolution,
-        field: np.ndarray,
-        heated: tuple[Heated, ...],
-        conductance: np.ndarray,
-        friction: np.ndarray,
-        counts: tuple[int, int],
-    ) -> HeatState:
-        """Return the state of a solution. Collective."""
-        torn, tearing = system.torn, self.decomposition.tearing
-        values = nodal_mean_at(self.decomposition, field, np.arange(tearing.n_nodes))[:, 0]
-        tied, passing = (torn.gathered(solution.multiplier, group) for group in torn.groups.joints)
-        heat = np.zeros(self.joints.points.count)
-        heat[conductance * self.joints.area > 0.0] = passing
-        balance = self._balance(torn, solution, field, heated, (heat, tied), friction)
-        inside = zip(heated, self.decomposition.parts, strict=True)
-        rates = tuple(-each.stored.at_nodes(field[part]) for each, part in inside)
-        return HeatState(
-            self.scene, torn, heated, system, solution, self.joints, values,
-            self._contacts(values, conductance, heat, friction.sum(axis=0)), tied, balance, rates,
-            *counts, dict(self.problem.timer.seconds),
-        )  # fmt: skip
-
-    def _contacts(
-        self, values: np.ndarray, conductance: np.ndarray, heat: np.ndarray, friction: np.ndarray
-    ) -> tuple[HeatThroughContact, ...]:
-        joints, found = self.joints, []
-        slave, master = joints.sides(values)
-        for number, contact in enumerate(self.scene.geometry.contacts):
-            mine = np.flatnonzero(joints.points.pair == number)
-            first = self.decomposition.tearing.first_of(contact.slave.body)
-            found.append(
-                HeatThroughContact(
-                    joints.points.slave[mine] - first, joints.places[mine], slave[mine], master[mine],
-                    conductance[mine], heat[mine], heat[mine] / joints.area[mine], friction[mine],
-                )
-            )  # fmt: skip
-        return tuple(found)
-
-    def _balance(
-        self,
-        torn: TornSystem,
-        solution: DualSolution,
-        field: np.ndarray,
-        heated: tuple[Heated, ...],
-        passing: tuple[np.ndarray, np.ndarray],
-        friction: np.ndarray,
-    ) -> HeatBalance:
-        """Return where heat comes from. Collective."""
-        scene, comm = self.scene, self.decomposition.comm
-        entering = np.zeros(len(scene.held) + len(scene.loads) + 2)
-        for each, part in zip(heated, self.decomposition.parts, strict=True):
-            for number, exchange in each.exchanges.items():
-                entering[len(scene.held) + number] += exchange.heat(field[part])
-            stored = -each.stored.at_nodes(field[part])
-            entering[-2:] += stored.sum(), np.abs(stored).sum()
-        first = self._first_held
-        self._add_held(entering, first, torn, solution)
-        entering = comm.allreduce(entering)
-        # Rows of contacts and ties have no entries at nodes that are held.
-        joints, through = self.joints, np.zeros(len(first))
-        for points, own in ((joints.points, passing[0]), (joints.tied, passing[1])):
-            through += points.jump.T @ own
-        np.add.at(entering, first[first >= 0], through[first >= 0])
-        parts: dict[str, float] = {}
-        for acting, given in zip((*scene.held, *scene.loads), entering, strict=False):
-            name = f"{type(acting).__name__} {acting.place}"
-            parts[name] = parts.get(name, 0.0) + float(given)
-        for number, contact in enumerate(scene.contacts):
-            mine = (self.joints.points.pair == number) & self.joints.on_obstacle
-            if mine.any():
-                parts[f"ThermalContact {contact.place}"] = -float(passing[0][mine].sum())
-            if contact.friction.part > 0.0:
-                slave, master = friction[:, self.joints.points.pair == number].sum(axis=1)
-                entering_master = float(master) * contact.pair.between_bodies
-                parts[f"FrictionHeat {contact.place}"] = float(slave) + entering_master
-        return HeatBalance(parts, *map(float, entering[-2:]))
-
-    @property
-    def _first_held(self) -> np.ndarray:
-        """The first of the held temperatures at each node, −1 where there is none, (n_nodes,)."""
-        tearing = self.decomposition.tearing
-        first = np.full(tearing.n_nodes, -1)
-        for number, held in reversed([*enumerate(self.scene.held)]):
-            mesh = self.scene.bodies[held.body].mesh
-            first[tearing.global_nodes(held.body, mesh.nodes_to_hold(held.surface))] = number
-        return first
-
-    def _add_held(
-        self, entering: np.ndarray, first: np.ndarray, torn: TornSystem, solution: DualSolution
-    ) -> None:
-        """Add the heat that enters this rank's rows of held temperatures, that of each node for its first."""
-        gluing = self.decomposition.gluing
-        owned = np.flatnonzero(torn.numbering.owned < torn.n_gluing)
-        dof = gluing.dof[torn.numbering.owned[owned]]
-        fixed = gluing.fixed.ravel()[dof]
-        np.subtract.at(entering, first[dof[fixed]], solution.multiplier[owned[fixed]])
 
 
 @collectively("solve_heat", lambda scene, comm, **_: comm)
