@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from fenics_contact._kinematics.measure import Measure
     from fenics_contact.feti.torn import TornSystem
     from fenics_contact.heat.assembly import Heated
+    from fenics_contact.heat.joints import Joints
     from fenics_contact.heat.scene import ConductingBody, HeatScene
+    from fenics_contact.heat.state import HeatThroughContact
     from fenics_contact.qp.solution import DualSolution
 
 
@@ -42,6 +44,14 @@ class Solved(Protocol):
     @property
     def solution(self) -> DualSolution:
         """The heat that passes at rows."""
+
+    @property
+    def joints(self) -> Joints:
+        """The points of contacts and ties."""
+
+    @property
+    def contacts(self) -> Sequence[HeatThroughContact]:
+        """What passes through each contact."""
 
     @property
     def values(self) -> np.ndarray:
@@ -83,7 +93,8 @@ def heat_through(state: Solved, body: str, surface: str) -> float:
     check_known(surface, mesh.surfaces, f"heat_through names {surface!r} of body {body!r}, which has")
     here = slice(first, first + mesh.n_nodes)
     # What rows of held temperatures, contacts and ties give to nodes; forces of gluing rows cancel.
-    given = -nodal_sum(torn.decomposition, torn.force(state.solution.multiplier))[here, 0]
+    rows = nodal_sum(torn.decomposition, torn.force(state.solution.multiplier))[:, 0]
+    given = (_rubbed(state) - rows)[here]
     sides = [Surface(each.body, each.surface) for each in scene.held]
     sides += [side for pair in (*scene.geometry.contacts, *scene.geometry.ties)
               for side in (pair.slave, pair.master) if isinstance(side, Surface)]  # fmt: skip
@@ -95,6 +106,15 @@ def heat_through(state: Solved, body: str, surface: str) -> float:
             share = _Around.of(state, body, surface, [load.surface]).share
             total += torn.decomposition.comm.allreduce(_given(state, number, share))
     return total
+
+
+def _rubbed(state: Solved) -> np.ndarray:
+    """Return the heat of friction at all nodes, (n_nodes,)."""
+    heat = np.zeros((2, state.joints.points.count))
+    for number, (contact, each) in enumerate(zip(state.scene.contacts, state.contacts, strict=True)):
+        share = contact.friction.share
+        heat[:, state.joints.points.pair == number] = np.outer((share, 1.0 - share), each.friction)
+    return state.joints.at_nodes(heat)
 
 
 def _given(state: Solved, number: int, share: np.ndarray) -> float:

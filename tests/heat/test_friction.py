@@ -65,11 +65,14 @@ def ends(heat: float, share: float, conductance: float) -> tuple[float, float]:
 @pytest.mark.parametrize("share", [0.5, 1.0, 0.2])
 def test_both_bodies_get_their_share_of_the_work(share: float):
     heat = 0.9 * 0.4 * 5.0 * 7.0
-    (rubbed,) = solve_heat(brake(FrictionHeat(0.4, 7.0, part=0.9, share=share)), MPI.COMM_SELF).contacts
+    state = solve_heat(brake(FrictionHeat(0.4, 7.0, part=0.9, share=share)), MPI.COMM_SELF)
+    (rubbed,) = state.contacts
     upper, lower = ends(heat, share, 30.0)
     assert rubbed.slave == pytest.approx(upper, rel=1e-9)
     assert rubbed.master == pytest.approx(lower, rel=1e-9)
     assert rubbed.friction.sum() == pytest.approx(2.0 * heat, rel=1e-12)
+    assert state.heat_through("upper", "y0") == pytest.approx(2.0 * 2.0 * upper, rel=1e-9)
+    assert state.heat_through("lower", "y1") == pytest.approx(2.0 * 50.0 * lower, rel=1e-9)
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
