@@ -19,7 +19,7 @@ from fenics_contact.decks.cards import DeckCards, Record
 from fenics_contact.decks.deck import Deck, deck_of, deck_with
 from fenics_contact.decks.heat_materials import conductance_of, conductor_of, read_conductances
 from fenics_contact.decks.heat_statics import moving, statics_of
-from fenics_contact.decks.heat_steps import NODES, VOLUMES, Acting, HeatCards, heat_steps
+from fenics_contact.decks.heat_steps import Acting, HeatCards, Whole, heat_steps
 from fenics_contact.decks.names import names_of
 from fenics_contact.decks.pairs import pairs_of
 from fenics_contact.decks.steps import groups_of, read_steps
@@ -191,7 +191,7 @@ def _read(path: Path) -> HeatDeck:
         if card.name == "EQUATION" and any(len(row) > 1 and row[1] == "11" for row in card.rows):
             raise card.error("equations of temperatures are not solved: join bodies by *TIE")
     steps = heat_steps(cards, deck.mesh)
-    heated = [each.at.elements for step in steps for each in step.acting if each.at.sides[0] == VOLUMES]
+    heated = [each.at.elements for step in steps for each in step.acting if each.at.sides[0] == Whole.VOLUME]
     sets = [(f"DFLUX {k}", elements) for k, elements in enumerate(heated, start=1)]
     mesh, sections, of_element, parts = split_sections(
         deck.mesh, deck.sections, deck.of_element, deck.components, sets
@@ -222,9 +222,9 @@ class _Builder:
         names, self.known = names_of(deck, read_steps(deck.cards, deck.mesh)), dict[bytes, str]()
         surfaces, node_sets = dict(names.surfaces), dict(names.node_sets)
         for each in (each for step in steps for each in step.acting):
-            if each.at.sides[0] == NODES:
+            if each.at.sides[0] == Whole.NODE:
                 node_sets[self._name(each)] = each.at.elements
-            elif each.at.sides[0] != VOLUMES:
+            elif each.at.sides[0] != Whole.VOLUME:
                 deck.exterior.require(each.at, each.card, each.row, "heat must enter", "correct it")
                 surfaces[self._name(each)] = each.at
         self.parts = build_bodies(
@@ -301,7 +301,7 @@ class _Builder:
         """Yield what is given to nodes, faces and volumes, body by body."""
         deck = self.deck
         for each in acting:
-            if each.at.sides[0] != VOLUMES:
+            if each.at.sides[0] != Whole.VOLUME:
                 name = self._name(each)
                 found = [Placed(each, body, name) for body in self.built.bodies_with(name)]
             else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -50,8 +51,13 @@ _OTHERS = {
     "NU": "fluxes and films of user routines are not read: give numbers, or functions in Python",
     "FC": "fluid networks are not solved: give the temperature of the fluid (F1, F2, ...)",
 }
-#: Sides of volumes and of nodes, which have none.
-VOLUMES, NODES = -1, -2
+
+
+class Whole(IntEnum):
+    """In place of the side of an element: all of it, or a node."""
+
+    VOLUME = -1
+    NODE = -2
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +154,7 @@ def _at_nodes(card: Card, mesh: DeckMesh, by: int) -> Iterator[Acting]:
         if component in ("0", "11"):
             nodes = mesh.nodes_named(entries[0], card, row)
             value = [*card.floats(row, 1), 0.0, 0.0][place]
-            yield Acting(card, row, make, Faces(nodes, np.full(len(nodes), NODES)), (value,), by)
+            yield Acting(card, row, make, Faces(nodes, np.full(len(nodes), Whole.NODE)), (value,), by)
         elif card.name == "CFLUX":
             raise card.error(f"needs node or set, 11 and a heat, got component {component!r}", row)
 
@@ -169,7 +175,7 @@ def _on_faces(card: Card, mesh: DeckMesh, by: int, constants: tuple[float, ...])
             at = mesh.surface_named(name, card, row).faces
         elif label == "BF" and letter == "S":
             elements = mesh.elements_named(name, card, row)
-            at = Faces(elements, np.full(len(elements), VOLUMES))
+            at = Faces(elements, np.full(len(elements), Whole.VOLUME))
         elif label[:1] == letter and label[1:].isdecimal():
             at = mesh.faces_of(mesh.elements_named(name, card, row), f"S{label[1:]}", card, row)
         else:

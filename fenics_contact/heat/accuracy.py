@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from fenics_contact.heat.assembly import Heated
     from fenics_contact.heat.joints import Joints
     from fenics_contact.heat.scene import ConductingBody, HeatScene
-    from fenics_contact.heat.state import HeatThroughContact
     from fenics_contact.qp.solution import DualSolution
 
 
@@ -50,7 +49,7 @@ class Solved(Protocol):
         """The points of contacts and ties."""
 
     @property
-    def contacts(self) -> Sequence[HeatThroughContact]:
+    def contacts(self) -> Sequence[Any]:
         """What passes through each contact."""
 
     @property

@@ -15,7 +15,7 @@ from fenics_contact._scene.checks import check_not_negative, check_positive
 from fenics_contact._scene.fields import finite_numbers
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
-from fenics_contact.heat.parts import STEFAN_BOLTZMANN
+from fenics_contact.heat.parts import Radiation
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +318,7 @@ class GapRadiation(Conductance):
     slave_emissivity: float
     master_emissivity: float
     absolute_zero: float = 0.0
-    constant: float = STEFAN_BOLTZMANN
+    constant: float = Radiation.constant
     curved: bool = True
 
     def __post_init__(self) -> None:

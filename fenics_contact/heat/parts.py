@@ -330,10 +330,6 @@ class Convection(Film):
         return h, np.maximum(h + given.slope(temperature) * (temperature - ambient), 0.5 * h)
 
 
-#: Stefan and Boltzmann's constant in W/(m² K⁴).
-STEFAN_BOLTZMANN = 5.670374419e-8
-
-
 @dataclass(frozen=True)
 @checked("emissivity", "ambient")
 class Radiation(Film):
@@ -357,7 +353,7 @@ class Radiation(Film):
     emissivity: float
     ambient: Value
     absolute_zero: float = 0.0
-    constant: float = STEFAN_BOLTZMANN
+    constant: float = 5.670374419e-8
 
     is_linear = False
 

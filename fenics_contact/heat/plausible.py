@@ -11,7 +11,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.plausible import LONG, METALS
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors.kinds import safe_log
-from fenics_contact.heat.parts import STEFAN_BOLTZMANN
+from fenics_contact.heat.parts import Radiation
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.materials.elastic import isotropic_constants
 
@@ -34,7 +34,7 @@ def odd_values(scene: HeatScene, metals: tuple[float, float] = (15.0, 430.0)) ->
                 "lengths are in m, or in mm with power in N mm/s"
             )
     for load in scene.loads:
-        if sizes[load.body] >= LONG and getattr(load, "constant", 0.0) == STEFAN_BOLTZMANN:
+        if sizes[load.body] >= LONG and getattr(load, "constant", 0.0) == Radiation.constant:
             yield (
                 f"odd units in Radiation {load.place}? its constant is in W/(m² K⁴), the body is "
                 f"{sizes[load.body]:.4g} long: in W and mm give constant=5.67e-14, in N mm/s 5.67e-11"

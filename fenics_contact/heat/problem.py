@@ -36,9 +36,6 @@ from fenics_contact.heat.state import HeatState
 from fenics_contact.qp.face_newton import ProjectedCG
 from fenics_contact.results.dual_solve import solve_dual
 
-#: Largest relative residual of a linear system.
-TOLERANCE = 1e-11
-
 
 @dataclass(frozen=True, eq=False)
 class GivenContact:
@@ -72,7 +69,7 @@ class HeatProblem:
         comm: MPI.Comm,
         *,
         partitions: Mapping[str, np.ndarray] | None = None,
-        tolerance: float = TOLERANCE,
+        tolerance: float = 1e-11,
     ) -> None:
         """Prepare; nothing is computed yet. Arguments as for `solve_heat`."""
         if not isinstance(scene, HeatScene):
@@ -240,7 +237,6 @@ class _Iteration:
         with timer.phase("solve"):
             start = None
             warm = self.scene.is_linear or tolerance > problem.tolerance
-            # A warm start leaves in the balance what an earlier system had left.
             if warm and last is not None and last.torn.numbering is torn.numbering:
                 start = last.solution.multiplier
             # The least residual that rounding leaves where films and storage hardly hold a subdomain.
@@ -249,7 +245,8 @@ class _Iteration:
             solution = solve_dual(system, ProjectedCG(tolerance=max(tolerance, reachable)), start)
             field = system.displacement(solution.multiplier, solution.alpha)
             products = counts[1] + system.products
-            if tolerance <= problem.tolerance < 100.0 * reachable:
+            # Large temperatures that laws have found round its balance, too.
+            if not warm or tolerance <= problem.tolerance < 100.0 * reachable:
                 solution, field, more = refined(system, solution, field, heated, max(1e-4, reachable))
                 products += more
         solved = Solved(self.scene, self.joints, heated, system, solution, field, conductance, friction)
@@ -291,7 +288,7 @@ def solve_heat(
     comm: MPI.Comm,
     *,
     partitions: Mapping[str, np.ndarray] | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float = 1e-11,
 ) -> HeatState:
     """Compute the steady temperatures of a scene. Collective on ``comm``.
 

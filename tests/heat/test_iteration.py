@@ -59,11 +59,11 @@ def blocks(conductor: Conductor, law: object, *loads: object, held: Held = (300.
 @pytest.mark.parametrize(
     ("state", "systems", "products"),
     [
-        (lambda: blocks(Conductor(50.0), 100.0, GLOWING), 10, 70),
-        slow(lambda: blocks(Conductor(50.0), GapRadiation(0.8, 0.8), GLOWING), 12, 90),
-        slow(lambda: blocks(Conductor(rising), 50.0), 14, 75),
-        slow(lambda: blocks(Conductor(TemperatureTable((300.0, 1500.0), (100.0, 1.0))), 50.0), 12, 70),
-        slow(lambda: blocks(Conductor(rising), GapRadiation(0.8, 0.8), GLOWING), 17, 150),
+        (lambda: blocks(Conductor(50.0), 100.0, GLOWING), 10, 75),
+        slow(lambda: blocks(Conductor(50.0), GapRadiation(0.8, 0.8), GLOWING), 12, 95),
+        slow(lambda: blocks(Conductor(rising), 50.0), 14, 82),
+        slow(lambda: blocks(Conductor(TemperatureTable((300.0, 1500.0), (100.0, 1.0))), 50.0), 12, 76),
+        slow(lambda: blocks(Conductor(rising), GapRadiation(0.8, 0.8), GLOWING), 17, 160),
     ],
     ids=["radiation", "across a gap", "rising", "falling", "all"],
 )

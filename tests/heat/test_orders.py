@@ -72,7 +72,7 @@ def test_bodies_of_revolution_have_it_also(shape: str, raised: str) -> None:
 
 LAWS = {
     "ufl": (1 + X[0] + T**2 / 5, Conductor(Ufl(lambda x, t: 1.0 + x[0] + t**2 / 5.0))),
-    "ufl of functions": (2 + sympy.sin(T) / 2, Conductor(Ufl(lambda x, t: 2.0 + 0.5 * ufl.sin(t)))),
+    "ufl of functions": (2 + sympy.sin(T / 2), Conductor(Ufl(lambda x, t: 2.0 + ufl.sin(0.5 * t)))),
     "table": (3 + T / 2, Conductor(TemperatureTable((-5.0, 5.0), (0.5, 5.5)))),
     "function": (3 + T**2 / 2, Conductor(lambda t: 3.0 + 0.5 * t**2)),
 }
