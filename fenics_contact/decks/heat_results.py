@@ -10,9 +10,7 @@ import numpy as np
 
 from fenics_contact.decks.results import DeckResults, Tables
 from fenics_contact.decks.tables import Print
-from fenics_contact.heat.state import HeatState
-from fenics_contact.mesh.cell_types import shape_gradients, shape_values
-from fenics_contact.mesh.collapsed import as_hexahedra, places_of
+from fenics_contact.heat.state import HeatState, flux_at
 from fenics_contact.output.frd import FrdField
 from fenics_contact.results.at_points import AtPoints, QuadraturePoints, added_up
 
@@ -29,12 +27,7 @@ class FluxAtPoints(AtPoints):
         """Return those of a body."""
         body, field = state.scene.bodies[name], state.scene.field.bodies[name]
         mesh, cell, points = body.mesh, field.element.cell, QuadraturePoints(field, np.zeros(0))
-        at, slopes = places_of(mesh.points, mesh.cells), shape_gradients(cell, points.positions)
-        slopes = slopes @ np.linalg.inv(np.einsum("cai,qaj->cqij", at, slopes))
-        nodal = as_hexahedra(state.temperature[name][mesh.cells], mesh.cells, mesh.dim)
-        shape = shape_values(cell, points.positions)
-        places, slope = np.einsum("qa,cai->cqi", shape, at), np.einsum("cqai,ca->cqi", slopes, nodal)
-        flux = -body.conducted(places, nodal @ shape.T, slope)
+        flux, slopes, _ = flux_at(body, cell, state.temperature[name], points.positions)
         heat = -body.thickness * np.einsum("cq,cqi,cqai->ca", points.weights, flux, slopes)
         flux = np.pad(flux, ((0, 0), (0, 0), (0, 3 - mesh.dim)))
         return cls(points.positions, cell, flux, added_up(mesh, heat[..., None]))

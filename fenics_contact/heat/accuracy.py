@@ -111,8 +111,7 @@ def _rubbed(state: Solved) -> np.ndarray:
     """Return the heat of friction at all nodes, (n_nodes,)."""
     heat = np.zeros((2, state.joints.points.count))
     for number, (contact, each) in enumerate(zip(state.scene.contacts, state.contacts, strict=True)):
-        share = contact.friction.share
-        heat[:, state.joints.points.pair == number] = np.outer((share, 1.0 - share), each.friction)
+        heat[:, state.joints.points.pair == number] = contact.friction.split(each.friction)
     return state.joints.at_nodes(heat)
 
 
@@ -121,9 +120,8 @@ def _given(state: Solved, number: int, share: np.ndarray) -> float:
     total, decomposition = 0.0, state.torn.decomposition
     for each, mesh in zip(state.heated, decomposition.meshes, strict=True):
         if number in each.exchanges:
-            exchange, nodes = each.exchanges[number], mesh.nodes
-            temperature = state.temperature[mesh.body][nodes]
-            total += float((exchange.load - exchange.matrix @ temperature) @ share[nodes])
+            temperature = state.temperature[mesh.body][mesh.nodes]
+            total += float(each.exchanges[number].at_nodes(temperature) @ share[mesh.nodes])
     return total
 
 

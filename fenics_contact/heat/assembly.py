@@ -68,6 +68,7 @@ class Assembly:
         """Prepare; nothing is assembled yet."""
         self.part = part
         self._known: dict[HeatLoad, Exchange] = {}
+        self._by_rate: dict[float, sp.csr_matrix] = {}
         self._last: tuple[list[sp.csr_matrix], Subdomain, np.ndarray, np.ndarray] | None = None
 
     @cached_property
@@ -134,11 +135,9 @@ class Assembly:
 
     def _scaled(self, matrix: sp.csr_matrix, factor: float) -> sp.csr_matrix:
         """Return a C, the same object for the same factor."""
-        known = self.__dict__.setdefault("_by_factor", {})
-        if factor not in known:
-            known.clear()
-            known[factor] = (factor * matrix).tocsr()
-        return known[factor]
+        if factor not in self._by_rate:
+            self._by_rate = {factor: (factor * matrix).tocsr()}
+        return self._by_rate[factor]
 
     def _subdomain(
         self, conduction: sp.csr_matrix, bed: sp.csr_matrix

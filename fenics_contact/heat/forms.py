@@ -47,6 +47,11 @@ class HeatForms:
             self.storage(FIELD, body.element)
             self.exchange(body.element)
 
+    def parts(self, scene: HeatScene, meshes: Sequence[SubdomainMesh]) -> tuple[Part, ...]:
+        """Return subdomains of a scene."""
+        solids = scene.field.bodies
+        return tuple(Part(each, scene.bodies[each.body], solids[each.body], self) for each in meshes)
+
     def conduction(self, material: Conductor, element: Element) -> Template:
         """Return ∫ k ∇u·∇v over the marked cells."""
         given, shape = material.tensor.ravel(), material.tensor.shape

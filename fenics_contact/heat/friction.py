@@ -69,6 +69,10 @@ class FrictionHeat:
         speed = not_negative("FrictionHeat.speed", self.speed, points)
         return np.asarray(self.part * (friction * touch.pressure * speed + work))
 
+    def split(self, heat: np.ndarray) -> np.ndarray:
+        """Return what of heat, (n,), enters the slave, and what the master, (2, n)."""
+        return np.outer((self.share, 1.0 - self.share), heat)
+
 
 #: No heat, whatever slides.
 NO_FRICTION_HEAT = FrictionHeat(part=0.0)

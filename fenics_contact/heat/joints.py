@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from fenics_contact._base.shared import once_a_machine
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.fields import evaluate, not_negative
 from fenics_contact._scene.local_axes import NO_AXES, LocalAxes
+from fenics_contact._scene.pairs import PairPart
 from fenics_contact._scene.parts import slave_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.decomposition import Decomposition
@@ -51,14 +53,20 @@ class Joints:
     ratio: np.ndarray
 
     @classmethod
-    def of(cls, scene: HeatScene, decomposition: Decomposition) -> Joints:
-        """Find the points of a scene. Collective."""
-        comm, tearing = decomposition.comm, decomposition.tearing
-        fixed = np.zeros((tearing.n_nodes, scene.geometry.dim), dtype=bool)
-        search = _Unheld(tearing, fixed, comm)
-        points, tied = contact_and_tied_points(scene.geometry, search, overlap=True)  # type: ignore[arg-type]
+    def of(cls, scene: HeatScene, decomposition: Decomposition, known: Sequence[Joints] = ()) -> Joints:
+        """Find the points of a scene, unless those of known ones are the same. Collective."""
+        comm = decomposition.comm
+        same = [(each.points, each.tied) for each in known if each._serve(scene)]
+        points, tied = same[0] if same else _found(scene, decomposition)
         described = once_a_machine(comm, lambda: _described(scene, points))
         return cls(scene, points, tied, *described)
+
+    def _serve(self, scene: HeatScene) -> bool:
+        """Return whether the points are those of a scene: same meshes, and pairs that face alike."""
+        mine, other = self.scene.geometry, scene.geometry
+        pairs = [[*each.contacts, *each.ties] for each in (mine, other)]
+        alike = len(pairs[0]) == len(pairs[1]) and all(map(_face_alike, *pairs))
+        return alike and mine.has_meshes_of(other)
 
     def touch(self, temperature: np.ndarray, pressure: np.ndarray, gap: np.ndarray) -> Touch:
         """Return what conductances depend on at temperatures of all nodes, (n_nodes,)."""
@@ -93,7 +101,7 @@ class Joints:
         for number, contact in enumerate(self.scene.contacts):
             mine, law = np.flatnonzero(self.points.pair == number), contact.friction
             flux = law.at(self.places[mine], touch.part(mine), work[mine])
-            heat[:, mine] = np.outer((law.share, 1.0 - law.share), self.area[mine] * flux)
+            heat[:, mine] = law.split(self.area[mine] * flux)
         return heat
 
     def at_nodes(self, heat: np.ndarray) -> np.ndarray:
@@ -112,6 +120,18 @@ class Joints:
         resistance = 1.0 / (conductance * self.area)[conducts]
         passing = ConductingRows.at(self.points.part(conducts), resistance, self.opposite[conducts])
         return ConductingRows.at(self.tied, perfect, perfect), passing
+
+
+def _found(scene: HeatScene, decomposition: Decomposition) -> tuple[ContactPoints, ContactPoints]:
+    """Search for the points of contacts and ties. Collective."""
+    fixed = np.zeros((decomposition.tearing.n_nodes, scene.geometry.dim), dtype=bool)
+    search = _Unheld(decomposition.tearing, fixed, decomposition.comm)
+    return contact_and_tied_points(scene.geometry, search, overlap=True)  # type: ignore[arg-type]
+
+
+def _face_alike(one: PairPart, other: PairPart) -> bool:
+    """Return whether points of two pairs are the same; obstacles are if they are one object."""
+    return (one.between_bodies or one.master is other.master) and one == other
 
 
 def _described(scene: HeatScene, points: ContactPoints) -> tuple[np.ndarray, ...]:

@@ -38,11 +38,7 @@ class AtTemperatures:
         forms.prepare(scene)
         held = prescribed_along(scene.field, tearing)[0][:, 0]
         values = followed(scene, decomposition, np.where(np.isnan(held), values, held))
-        parts = tuple(
-            Part(mesh, scene.bodies[mesh.body], scene.field.bodies[mesh.body], forms)
-            for mesh in decomposition.meshes
-        )
-        joints, heated = Joints.of(scene, decomposition), []
+        parts, joints, heated = forms.parts(scene, decomposition.meshes), Joints.of(scene, decomposition), []
         with together(decomposition.comm):
             touch = joints.touch(values, joints.pressure, joints.points.gap)
             rubbed = joints.at_nodes(joints.friction(touch, np.zeros(joints.points.count)))

@@ -17,16 +17,14 @@ from fenics_contact._base.shared import once_a_machine
 from fenics_contact._pairing.points import join_points
 from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively, together
 from fenics_contact.feti.all_rows import RowGroups
-from fenics_contact.feti.contact_rows import NormalRows, TangentialRows
 from fenics_contact.feti.decomposition import Decomposition, decompose, prescribed_along
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.free_motions import free_motions
-from fenics_contact.feti.row_groups import Glued
-from fenics_contact.feti.torn import TornSystem, at_rest, numbered
+from fenics_contact.feti.torn import NumberedRows, TornSystem, at_rest, numbered, with_contact
 from fenics_contact.heat.acceleration import CautiousAnderson
 from fenics_contact.heat.assembly import Assembly, Heated, Rate
 from fenics_contact.heat.determined import require_agreement, require_temperatures
-from fenics_contact.heat.forms import HeatForms, Part
+from fenics_contact.heat.forms import HeatForms
 from fenics_contact.heat.joints import Joints
 from fenics_contact.heat.plausible import odd_values, warn_of
 from fenics_contact.heat.rows import ConductingRows
@@ -82,7 +80,7 @@ class HeatProblem:
         self._partitions = partitions
         self._decomposition: Decomposition | None = None
         self._assemblies: tuple[Assembly, ...] = ()
-        self._joints: Joints | None = None
+        self._joints: tuple[Joints, ...] = ()
         self._stiffness = np.zeros(0)
 
     def _facts(self) -> dict[str, Any]:
@@ -99,10 +97,7 @@ class HeatProblem:
                 self._decomposition = decompose(field, cut, self.comm)
                 self._stiffness = self._decomposition.tearing.copy_stiffness
                 forms = HeatForms(self._decomposition.forms.templates)
-                self._assemblies = tuple(
-                    Assembly(Part(mesh, self.scene.bodies[mesh.body], field.bodies[mesh.body], forms))
-                    for mesh in self._decomposition.meshes
-                )
+                self._assemblies = tuple(map(Assembly, forms.parts(self.scene, self._decomposition.meshes)))
         return self._decomposition
 
     def weighted(self, decomposition: Decomposition, heated: tuple[Heated, ...]) -> Decomposition:
@@ -152,10 +147,10 @@ class HeatProblem:
     def joints(self, scene: HeatScene) -> Joints:
         """Return the points of contacts and ties of a scene, those of the last one again. Collective."""
         decomposition = self.decomposition.holding(scene.field)
-        if self._joints is None or self._joints.scene is not scene:
+        if not any(known.scene is scene for known in self._joints):
             with self.timer.phase("pair"):
-                self._joints = Joints.of(scene, decomposition)
-        return self._joints
+                self._joints = (Joints.of(scene, decomposition, self._joints),)
+        return self._joints[0]
 
 
 def as_given(joints: Joints) -> GivenContact:
@@ -185,7 +180,7 @@ class _Iteration:
         for count in range(1, most + 1):
             state = self._linear(guess, last, tolerance, (count, products))
             products, last = state.products, state
-            size = np.abs(state.values - self._level(state.values)).max()
+            size = np.abs(state.values - state.values.mean()).max()
             following = anderson.next(guess, state.values)
             left = anderson.change * min(max(anderson.rate, 0.05), 1.0)
             # Even temperatures change by nothing but what linear systems leave.
@@ -214,9 +209,6 @@ class _Iteration:
             return self.rate.before
         count, known = self.decomposition.tearing.n_nodes, [*self.scene.levels]
         return np.full(count, float(np.mean(known)) if known else 0.0)
-
-    def _level(self, values: np.ndarray) -> float:
-        return float(values.mean())
 
     def _linear(
         self, guess: np.ndarray, last: HeatState | None, tolerance: float, counts: tuple[int, int]
@@ -273,13 +265,27 @@ class _Iteration:
         scene, comm = self.scene.field, decomposition.comm
         prescribed, _ = once_a_machine(comm, lambda: prescribed_along(scene, decomposition.tearing))
         none = join_points([], scene.dim, decomposition.tearing.n_nodes)
-        normal = NormalRows.of(scene, none, decomposition.axes)
-        slips = TangentialRows.of(scene, none, prescribed, comm, decomposition.axes)
-        groups = RowGroups(Glued(decomposition.gluing), joints, normal, slips)
-        rows = numbered(groups, decomposition, None if last is None else last.torn.numbering)
+        groups = with_contact(scene, decomposition, joints, none, prescribed)
+        if last is None:
+            rows = numbered(groups, decomposition, None)
+        else:
+            rows = _numbered_as(last.torn, groups, decomposition)
         free = free_motions(scene, decomposition.tearing)
         subdomains = tuple(each.subdomain for each in heated)
         return at_rest(scene, decomposition, subdomains, rows, prescribed, free)
+
+
+def _numbered_as(known: TornSystem, groups: RowGroups, decomposition: Decomposition) -> NumberedRows:
+    """Return rows numbered as known ones. Collective.
+
+    B stays the same object where rows do, which marks F as unchanged, too.
+    """
+    alike = known.decomposition is decomposition
+    joints = (each.of(ConductingRows) for each in (groups, known.groups))
+    alike = alike and all(map(ConductingRows.act_as, *joints))
+    if decomposition.comm.allreduce(int(not alike)):
+        return numbered(groups, decomposition, known.numbering)
+    return NumberedRows(groups, known.numbering, known.B)
 
 
 @collectively("solve_heat", lambda scene, comm, **_: comm)

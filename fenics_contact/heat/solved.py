@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -82,10 +83,9 @@ class Solved:
         tied, passing = (torn.gathered(self.solution.multiplier, group) for group in torn.groups.joints)
         heat = np.zeros(self.joints.points.count)
         heat[self.conductance * self.joints.area > 0.0] = passing
-        rates = tuple(-each.stored.at_nodes(own) for each, own in self._inside)
         return HeatState(
             self.scene, torn, self.heated, self.system, self.solution, self.joints, values,
-            self._contacts(values, heat), tied, self._balance(heat, tied), rates, systems, products,
+            self._contacts(values, heat), tied, self._balance(heat, tied), self._stored, systems, products,
             dict(seconds),
         )  # fmt: skip
 
@@ -94,6 +94,11 @@ class Solved:
         """Subdomains with their temperatures."""
         for each, part in zip(self.heated, self.decomposition.parts, strict=True):
             yield each, self.field[part]
+
+    @cached_property
+    def _stored(self) -> tuple[np.ndarray, ...]:
+        """Heat that the nodes of each subdomain take up, (n,) each."""
+        return tuple(-each.stored.at_nodes(own) for each, own in self._inside)
 
     def _contacts(self, values: np.ndarray, heat: np.ndarray) -> tuple[HeatThroughContact, ...]:
         joints, found, friction = self.joints, [], self.friction.sum(axis=0)
@@ -133,7 +138,7 @@ class Solved:
         for each, own in self._inside:
             for number, exchange in each.exchanges.items():
                 entering[len(scene.held) + number] += exchange.heat(own)
-            stored = -each.stored.at_nodes(own)
+        for stored in self._stored:
             entering[-2:] += stored.sum(), np.abs(stored).sum()
         self._add_held(entering, first)
         entering = np.asarray(self.decomposition.comm.allreduce(entering))

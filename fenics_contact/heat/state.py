@@ -16,8 +16,8 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.heat.assembly import Heated
 from fenics_contact.heat.fields import HeatOnBodies
 from fenics_contact.heat.joints import Joints
-from fenics_contact.heat.scene import HeatScene
-from fenics_contact.mesh.cell_types import cell_type_of, quadrature, shape_gradients, shape_values
+from fenics_contact.heat.scene import ConductingBody, HeatScene
+from fenics_contact.mesh.cell_types import CellType, cell_type_of, quadrature, shape_gradients, shape_values
 from fenics_contact.mesh.collapsed import as_hexahedra, places_of
 from fenics_contact.qp.solution import DualSolution
 
@@ -196,14 +196,25 @@ class HeatState(HeatOnBodies):
 def cell_flux(scene: HeatScene, name: str, temperature: np.ndarray) -> np.ndarray:
     """Return −k ∇T of the cells of a body, (n_cells, dim)."""
     body = scene.bodies[name]
-    mesh, cell = body.mesh, cell_type_of(body.mesh.cells, body.mesh.dim)
+    cell = cell_type_of(body.mesh.cells, body.mesh.dim)
     positions, weights = quadrature(cell, 2)
-    gradients, shape = shape_gradients(cell, positions), shape_values(cell, positions)
-    corners = places_of(mesh.points, mesh.cells)
-    values = as_hexahedra(temperature[mesh.cells], mesh.cells, mesh.dim)
-    jacobian = np.einsum("qkd,cke->cqed", gradients, corners)
-    gradient = np.einsum("qkd,cqde,ck->cqe", gradients, np.linalg.inv(jacobian), values, optimize=True)
-    measure = weights * np.abs(np.linalg.det(jacobian))
-    places = np.einsum("qk,cke->cqe", shape, corners)
-    flux = -body.conducted(places, values @ shape.T, gradient)
-    return np.asarray(np.einsum("cq,cqe->ce", measure, flux) / measure.sum(axis=1)[:, None])
+    flux, _, volumes = flux_at(body, cell, temperature, positions)
+    measure = weights * volumes
+    return np.asarray(np.einsum("cq,cqi->ci", measure, flux) / measure.sum(axis=1)[:, None])
+
+
+def flux_at(
+    body: ConductingBody, cell: CellType, temperature: np.ndarray, positions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return −k ∇T at positions in all cells of a body, ∇ of the functions of nodes, and volumes.
+
+    `cell`: its reference cell, in which `positions`, (n_points, dim), are; `temperature`: at the nodes of the
+    body. Shapes are (n_cells, n_points, dim), (n_cells, n_points, n_nodes, dim) and (n_cells, n_points).
+    """
+    mesh, shape, slopes = body.mesh, shape_values(cell, positions), shape_gradients(cell, positions)
+    at = places_of(mesh.points, mesh.cells)
+    nodal = as_hexahedra(temperature[mesh.cells], mesh.cells, mesh.dim)
+    jacobian = np.einsum("cai,qaj->cqij", at, slopes)
+    slopes = slopes @ np.linalg.inv(jacobian)
+    places, slope = np.einsum("qa,cai->cqi", shape, at), np.einsum("cqai,ca->cqi", slopes, nodal)
+    return -body.conducted(places, nodal @ shape.T, slope), slopes, np.abs(np.linalg.det(jacobian))

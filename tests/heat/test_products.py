@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Surface, box_partition
-from fenics_contact.gallery import block
+from fenics_contact import RigidPlane, Surface, box_partition
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.heat import (
     ConductingBody,
     Conductor,
     Convection,
+    GapConductance,
     HeatProblem,
     HeatScene,
     HeatSource,
     HeatState,
     HeldTemperature,
     ThermalContact,
+    solve_heat,
 )
 from fenics_contact.heat.assembly import Rate
 from tests.heat.bodies import Cut, boxes, waves
@@ -127,3 +129,26 @@ def test_equal_subdomains_share_factors_turned_and_mirrored_ones_too():
     other = HeatProblem(boxes(3, 3, 3, held=True)[0], MPI.COMM_SELF).solve
     assert one.system.kinds == 4
     assert other().values == pytest.approx(solved(boxes(3, 3, 3, held=True)).values, abs=1e-9)
+
+
+def test_scenes_that_follow_keep_points_and_rows_while_these_are_the_same():
+    low, up = (rectangle((0.0, y), (1.0, y + 1.0), (n, n)) for y, n in ((0.0, 5), (1.0, 4)))
+    bodies = {name: ConductingBody(mesh, Conductor(1.0)) for name, mesh in (("low", low), ("up", up))}
+
+    def given(conductance: float, wall: float = 2.0) -> HeatScene:
+        """Return a new scene; the wall's vectors are arrays, which do not compare."""
+        plane = RigidPlane(np.array([0.0, wall]), np.array([0.0, -1.0]))
+        film = ThermalContact(Surface("up", "y0"), Surface("low", "y1"), conductance)
+        cooled = ThermalContact(Surface("up", "y1"), plane, GapConductance(1.0, 1.0), 20.0)
+        return HeatScene(bodies, [HeldTemperature("low", "y0", 100.0)], contacts=[film, cooled])
+
+    problem = HeatProblem(given(3.0), MPI.COMM_SELF)
+    first, same = problem.solve(), problem.solve(replace(problem.scene, held=[*problem.scene.held]))
+    assert same.joints.points is first.joints.points
+    assert same.torn.B is first.torn.B
+    assert same.system.preconditioner is first.system.preconditioner
+    for other in (given(30.0), given(30.0, 2.5)):
+        state, alone = problem.solve(other), solve_heat(other, MPI.COMM_SELF)
+        assert state.torn.B is not same.torn.B
+        np.testing.assert_allclose(state.values, alone.values, atol=1e-8)
+        np.testing.assert_allclose(state.joints.points.gap, alone.joints.points.gap)
