@@ -21,7 +21,7 @@ Equilibrium: solve_scene, solve_nested, solve_steps, ContactProblem, LoadSequenc
     TangentNewton, FixedPoint, Tolerance, wear_to, WearLimits
 
 To an accuracy: solve_to, solve_steps_to, minimize_to, Limits, Level, AccurateResult, AccurateDesign,
-    TransferredState, quantity, goal_error, GoalError
+    TransferredState, quantity, goal_error, GoalError, ErrorEstimate
 
 Results: State, LinearState, DeformedState, NewtonSteps, Status, contact_area,
     contact_width
@@ -53,12 +53,13 @@ from fenics_contact._base import requirements
 from fenics_contact._base.late_names import homes
 
 if TYPE_CHECKING:
+    from fenics_contact._adaptive.equilibrium import solve_to as solve_to
+    from fenics_contact._adaptive.estimates import ErrorEstimate as ErrorEstimate
     from fenics_contact._adaptive.goal_errors import GoalError as GoalError
     from fenics_contact._adaptive.goal_errors import goal_error as goal_error
     from fenics_contact._adaptive.levels import AccurateResult as AccurateResult
     from fenics_contact._adaptive.levels import Level as Level
     from fenics_contact._adaptive.levels import Limits as Limits
-    from fenics_contact._adaptive.levels import solve_to as solve_to
     from fenics_contact._adaptive.load_steps import solve_steps_to as solve_steps_to
     from fenics_contact._adaptive.minimised import AccurateDesign as AccurateDesign
     from fenics_contact._adaptive.minimised import minimize_to as minimize_to

@@ -11,7 +11,8 @@ from mpi4py import MPI
 
 from benchmarks.adaptive.cases import CASES, Case
 from fenics_contact import Scene, solve_scene
-from fenics_contact._adaptive.levels import AccurateResult, Limits, solve_to, unknowns_of
+from fenics_contact._adaptive.equilibrium import solve_to
+from fenics_contact._adaptive.levels import AccurateResult, Limits, unknowns_of
 from fenics_contact._adaptive.refined_scene import refine_scene
 from fenics_contact.design import Objective
 from fenics_contact.design.forms import ShapeForms

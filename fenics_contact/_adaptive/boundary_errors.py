@@ -20,6 +20,7 @@ from fenics_contact._surfaces.facets import FacetedSurface, corner_places, heigh
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean
 from fenics_contact.feti.subdomain import Subdomain, assemble
+from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.results.linear_state import LinearState
 
 
@@ -46,20 +47,19 @@ def between_facets(
     torn, parts, total = state.torn, Parts(state.scene.bodies), 0.0
     comm = torn.decomposition.comm
     with together(comm):
-        moved = _moved(torn.scene, step)
-    if moved is None:
+        meshes = towards_shapes(torn.scene, step)
+    if not meshes:
         return 0.0, {}
+    bodies = torn.scene.bodies
+    changed = {name: replace(bodies[name], mesh=mesh) for name, mesh in meshes.items()}
+    moved = replace(torn.scene, bodies={**bodies, **changed})
     fields = (
         nodal_mean(torn.decomposition, state.conforming_displacement),
         nodal_mean(torn.decomposition, along),
     )
     with together(comm):
         loads = as_tractions(moved)
-        changes = {
-            name: _Change(state, moved, name, loads)
-            for name, body in moved.bodies.items()
-            if body is not torn.scene.bodies[name]
-        }
+        changes = {name: _Change(state, moved, name, loads) for name in changed}
         for subdomain in torn.subdomains:
             if (change := changes.get(subdomain.mesh.body)) is not None:
                 by_cell = change.by_cell(subdomain, fields, own) / step
@@ -68,8 +68,8 @@ def between_facets(
     return float(comm.allreduce(total)), parts.joined()
 
 
-def _moved(scene: Scene, step: float) -> Scene | None:
-    """Return the scene with a part of the way of all curved boundaries to their true shapes, None without."""
+def towards_shapes(scene: Scene, step: float) -> dict[str, BodyMesh]:
+    """Return the meshes with a part of the way of their curved boundaries to their true shapes, by body."""
     moved = {}
     for name, body in scene.bodies.items():
         if body.mesh.order > 1 or body.is_rigid:
@@ -81,8 +81,8 @@ def _moved(scene: Scene, step: float) -> Scene | None:
             curved = [surface for surface in curved if surface.relief is not None]
             way = _way_outwards(body.mesh.n_nodes, curved) if curved else np.zeros(1)
         if way.any():
-            moved[name] = replace(body, mesh=body.mesh.moved(body.mesh.points + step * way))
-    return replace(scene, bodies={**scene.bodies, **moved}) if moved else None
+            moved[name] = body.mesh.moved(body.mesh.points + step * way)
+    return moved
 
 
 def _way_outwards(n_nodes: int, curved: list[FacetedSurface]) -> np.ndarray:

@@ -21,8 +21,8 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,12 +31,12 @@ from fenics_contact._accuracy.discretisation import (
     OfCells,
     discretisation_error,
     error_products,
-    of_every_cell,
 )
 from fenics_contact._adaptive.boundary_errors import EnergyShares, between_facets
 from fenics_contact._adaptive.contact_residuals import between_nodes, of_pressures
+from fenics_contact._adaptive.estimates import ErrorEstimate
 from fenics_contact._adaptive.indicator import stress_indicator
-from fenics_contact._base.display import Table, tabled
+from fenics_contact._base.display import tabled
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import Task
 from fenics_contact._base.threads import one_thread
@@ -64,72 +64,18 @@ from fenics_contact.results.state import State, comm_of
 
 @tabled
 @dataclass(frozen=True, eq=False)
-class GoalError:
+class GoalError(ErrorEstimate):
     """Estimated parts of J − J_h, the exact value of a quantity less that of a state, in its unit.
 
-    All are estimates with a sign, none is a bound.
+    All are estimates with a sign, none is a bound; see `ErrorEstimate` for the others.
 
     Attributes:
-        value: J_h, that of the state.
-        mesh: By the mesh; NaN if there is no adjoint, see ``without_adjoint``.
-        uncancelled: The same if no parts of it cancelled, ≥ 0: where it is much larger than ``mesh``, that
-            is uncertain.
-        geometry: By facets of linear cells on boundaries whose true shape is known, which enclose less or
-            more than the shape, and by contact surfaces that are not measured between the true shapes; to
-            first order. What the quantity itself depends on the shape counts for energies alone.
-        solver: By the residuals of the solver, with friction at its own slip bounds, to first order.
         friction: By slip bounds of the solver that are not those of its normal forces, to first order.
-        without_adjoint: Why there is no adjoint, in words; empty where there is one. All parts are NaN
-            without one, and the shares of cells those of the energy norm, or of nonlinear materials
-            `stress_indicator`.
     """
 
-    value: float
-    mesh: float
-    uncancelled: float
-    geometry: float
-    solver: float
+    PARTS: ClassVar = (*ErrorEstimate.PARTS, "friction")
+
     friction: float
-    without_adjoint: str
-    _comm: MPI.Comm = field(repr=False)
-    _sizes: Mapping[str, int] = field(repr=False)
-    _own: OfCells = field(repr=False)
-
-    @property
-    def total(self) -> float:
-        """J − J_h, the sum of all parts."""
-        return self.mesh + self.geometry + self.solver + self.friction
-
-    @property
-    def known(self) -> float:
-        """The sum of all parts; 0 where there is no adjoint, as nothing is known then."""
-        return 0.0 if self.without_adjoint else self.total
-
-    def by_cell(self, body: str) -> np.ndarray:
-        """Return the share of each cell of a body in the mesh's part, shape (n_cells,), replicated.
-
-        It is √(∫ C e : e ∫ C f : f) with the errors e of the state and f of the adjoint, for energies with
-        half of ∫ C e : e: it has no sign and bounds what the cell adds. Collective.
-
-        Raises:
-            InvalidInputError: If there is no such body.
-        """
-        return of_every_cell(self._comm, self._sizes, self._own, body)
-
-    @property
-    def in_words(self) -> dict[str, str]:
-        """Name of each part -> its size, and relative to the value."""
-        parts = {name: getattr(self, name) for name in ("mesh", "geometry", "solver", "friction", "total")}
-        return {"value": f"{self.value:.6g}", **{name: self._sized(part) for name, part in parts.items()}}
-
-    def _sized(self, part: float) -> str:
-        if np.isnan(part):
-            return f"not known: {self.without_adjoint}"
-        return f"{part:+.3g} ({100 * part / abs(self.value):+.2g} %)" if self.value else f"{part:+.3g}"
-
-    def _tables(self) -> list[Table]:
-        """Return a table with one line for each part."""
-        return [Table(list(self.in_words.items()), 2, headed=False)]
 
 
 def _comm_of(state: State, *_: object, **__: object) -> MPI.Comm:
@@ -209,8 +155,8 @@ def goal_error(
         geometry = _by_geometry(linear, adjoint) + boundary
         friction = _by_friction(linear, partials, adjoint, linearised)
     return GoalError(
-        value, inside + sum(others), bound, geometry, of_solver.correction, friction, "",
-        comm, _sizes(state), shares,
+        value, inside + sum(others), bound, geometry, of_solver.correction, "", comm, _sizes(state), shares,
+        friction,
     )  # fmt: skip
 
 
@@ -312,10 +258,10 @@ def _indicated(state: State, value: float) -> GoalError:
         indicator = stress_indicator(state, name)
         cells = np.arange(body.mesh.n_cells if comm.rank == 0 else 0)  # each cell counts once
         shares[name] = cells, indicator[cells]
-    return GoalError(value, nan, nan, nan, nan, nan, why, comm, _sizes(state), shares)
+    return GoalError(value, nan, nan, nan, nan, why, comm, _sizes(state), shares, nan)
 
 
 def _without_adjoint(state: LinearState, value: float, why: str) -> GoalError:
     """Return unknown parts, and the energy norm by cell. Collective."""
     energy, nan = discretisation_error(state.torn, state.conforming_displacement), float("nan")
-    return GoalError(value, nan, nan, nan, nan, nan, why, comm_of(state), _sizes(state), energy.own_cells)
+    return GoalError(value, nan, nan, nan, nan, why, comm_of(state), _sizes(state), energy.own_cells, nan)

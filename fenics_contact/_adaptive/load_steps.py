@@ -6,14 +6,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeAlias
 
-from fenics_contact._adaptive.levels import (
-    AccurateResult,
-    AdaptiveLoop,
-    Level,
-    Limits,
-    followed,
-    require_share,
-)
+from fenics_contact._adaptive.equilibrium import AdaptiveLoop
+from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, require_share
 from fenics_contact._adaptive.quantities import quantity as named
 from fenics_contact._base.libraries import MPI
 from fenics_contact._equilibrium.carried import TransferredState
@@ -40,7 +34,7 @@ def solve_steps_to(
     solver: DualSolver | None = None,
     tolerance: float = 1e-6,
     callback: Callable[[LoadStep, Level], None] | None = None,
-) -> tuple[AccurateResult, ...]:
+) -> tuple[AccurateResult[State], ...]:
     """Compute a quantity at the end of every load step to an accuracy, each on meshes of its own.
 
     Every step begins on the meshes of the scene and refines them where its quantity needs that, as `solve_to`
@@ -78,7 +72,7 @@ def solve_steps_to(
         require_steps(steps)
         require_share(relative_error)
         objective = named(quantity, scene) if isinstance(quantity, str) else quantity
-    results: list[AccurateResult] = []
+    results: list[AccurateResult[State]] = []
     carried: Carried = _nothing
     for number, step in enumerate(steps, start=1):
         with together(comm):
@@ -86,7 +80,8 @@ def solve_steps_to(
         last = _StepLoop(timed(step, number), carried, objective, relative_error, limits or Limits(), comm)
         carried = last.to_next
         show = None if callback is None else partial(callback, step)
-        results.append(followed(last, ContactProblem(scene, comm, solver=solver, tolerance=tolerance), show))
+        problem = ContactProblem(scene, comm, solver=solver, tolerance=tolerance)
+        results.append(last.follow(problem, show))
     return tuple(results)
 
 

@@ -10,15 +10,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fenics_contact._adaptive.equilibrium import AdaptiveLoop
 from fenics_contact._adaptive.goal_errors import goal_error, value_of
-from fenics_contact._adaptive.levels import (
-    AccurateResult,
-    AdaptiveLoop,
-    Level,
-    Limits,
-    followed,
-    require_share,
-)
+from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, require_share
 from fenics_contact._adaptive.refined_designs import refined_design, refined_for_designs
 from fenics_contact._adaptive.refined_scene import SceneRefinement
 from fenics_contact._adaptive.underresolved_contact import refined_at_spots, underresolved_pairs
@@ -42,7 +36,7 @@ ConstraintsOf: TypeAlias = "Constraints | Callable[[ShapeProblem], Constraints]"
 
 @tabled
 @dataclass(frozen=True, eq=False)
-class AccurateDesign(AccurateResult):
+class AccurateDesign(AccurateResult[State]):
     """An optimised design with the error of its objective, and the meshes on the way.
 
     Attributes:
@@ -143,7 +137,7 @@ def minimize_to(
     start = np.array(x0, dtype=float)
     way = _Descent(problem, start, relative_error, limits or Limits(), method or BundleTrust(), settings)
     way.constrained = partial(_constraints_on, constraints)
-    found = followed(way, problem.contact.on(problem.scene, problem.contact.partitions), callback)
+    found = way.follow(problem.contact.on(problem.scene, problem.contact.partitions), callback)
     return AccurateDesign(**vars(found), problems=tuple(way.problems), optimisations=tuple(way.optimisations))
 
 

@@ -176,7 +176,7 @@ def table_of_levels(console: Console) -> Callable[[Level], None]:
     return lambda level: console.write(LEVEL.format(*level.in_words))
 
 
-def _write(file: SceneFile, state: State, accurate: AccurateResult | None = None) -> None:
+def _write(file: SceneFile, state: State, accurate: AccurateResult[State] | None = None) -> None:
     """Write the files of a scene without load steps. Collective."""
     _write_fields(file, state, file.folder)
     if "csv" in file.document.output.files:

@@ -599,9 +599,10 @@ def _levels(record: Mapping[str, Any]) -> dict[str, Any]:
     levels = accuracy.get("levels") or {}
     if not levels:
         return {}
+    sizes = levels.get("size", np.abs(levels["value"]).tolist())  # older records are of mechanics alone
     errors = [
-        None if error is None or not value else error / abs(value)
-        for error, value in zip(levels["error"], levels["value"], strict=True)
+        None if error is None or not size else error / size
+        for error, size in zip(levels["error"], sizes, strict=True)
     ]
     seconds = np.cumsum(levels["seconds"]).tolist()
     return {

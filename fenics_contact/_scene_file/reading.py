@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 import numpy as np
 from pydantic import BaseModel
 
-from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, solve_to
+from fenics_contact._adaptive.equilibrium import solve_to
+from fenics_contact._adaptive.levels import AccurateResult, Level, Limits
 from fenics_contact._adaptive.minimised import AccurateDesign, minimize_to
 from fenics_contact._adaptive.nested import check_nested, solve_nested
 from fenics_contact._adaptive.quantities import quantity
@@ -512,7 +513,7 @@ class SceneFile:
                 return OwnObjective(asked.quantity).found(self.source.folder)
             return quantity(asked.quantity, self.scene, **asked.where)
 
-    def solve_to(self, callback: Callable[[Level], None] | None = None) -> AccurateResult:
+    def solve_to(self, callback: Callable[[Level], None] | None = None) -> AccurateResult[State]:
         """Compute the quantity of [accuracy] as accurately as it asks for. Collective.
 
         `callback`: called with every level once it is done.

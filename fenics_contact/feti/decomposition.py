@@ -180,13 +180,13 @@ def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalA
     Returns the value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length], and
     along which axes.
     """
-    prescribed = np.full((tearing.n_nodes, scene.components), np.nan)
+    prescribed, largest = np.full((tearing.n_nodes, scene.components), np.nan), 0.0
     held = ((support, *each) for support in scene.supports for each in support.held(scene))
     for support, own, given in held:
         nodes = tearing.global_nodes(support.body, own)
         known = prescribed[nodes]
-        near = LAST_PLACES * np.nanmax(np.abs(given))
-        clash = ~np.isnan(known) & ~np.isnan(given) & (np.abs(known - given) > near)
+        largest = max(largest, np.nanmax(np.abs(given)))
+        clash = ~np.isnan(known) & ~np.isnan(given) & (np.abs(known - given) > LAST_PLACES * largest)
         if clash.any():
             node, component = np.argwhere(clash)[0]
             raise InvalidInputError(

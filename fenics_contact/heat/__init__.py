@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     )
     from fenics_contact.heat.coupled import HeatedState, solve_heated
     from fenics_contact.heat.friction import FrictionHeat, effusivity_share
+    from fenics_contact.heat.goal_errors import heat_goal_error
+    from fenics_contact.heat.levels import solve_heat_to
     from fenics_contact.heat.objectives import (
         HeatObjective,
         HeatOfContact,
@@ -74,8 +76,10 @@ __all__ = [
     "effusivity_share",
     "harmonic_mean",
     "heat_adjoint",
+    "heat_goal_error",
     "heat_in_time",
     "solve_heat",
+    "solve_heat_to",
     "solve_heated",
 ]
 

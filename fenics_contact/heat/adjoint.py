@@ -66,13 +66,16 @@ class HeatAdjoint:
         """
         at = np.asarray(at, dtype=float)
         steps = np.diag(step * np.where(at == 0.0, 1.0, np.abs(at)))
-        ends = [[self._lagrangian(scenes(at + sign * change)) for sign in (1.0, -1.0)] for change in steps]
+        known = self.state.torn.decomposition, self.state.values
+        ends = [
+            [self.lagrangian(AtTemperatures.of(scenes(at + sign * change), *known)) for sign in (1.0, -1.0)]
+            for change in steps
+        ]
         return np.array([ahead - behind for ahead, behind in ends]) / (2.0 * np.diag(steps))
 
-    def _lagrangian(self, scene: HeatScene) -> float:
-        """Return J − wᵀ R − ζᵀ B T of a scene, with B of ties."""
-        at = AtTemperatures.of(scene, self.state.torn.decomposition, self.state.values)
-        tied, w = at.joints.tied.jump, followed(scene, at.decomposition, self.values)
+    def lagrangian(self, at: AtTemperatures) -> float:
+        """Return J − wᵀ R − ζᵀ B T of a scene at the temperatures of the state, with B of ties."""
+        tied, w = at.joints.tied.jump, followed(at.scene, at.decomposition, self.values)
         if tied.shape[0] != len(self.ties):
             raise InvalidInputError(
                 f"derivatives need the same tied points, {len(self.ties)}, got {tied.shape[0]} after a step: "

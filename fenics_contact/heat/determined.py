@@ -16,14 +16,16 @@ from fenics_contact.heat.scene import HeatScene
 def require_agreement(scene: HeatScene) -> None:
     """Raise where temperatures that are held differ at nodes that they share."""
     known: dict[str, list[tuple[HeldTemperature, np.ndarray, np.ndarray]]] = {}
+    largest = 0.0
     for held in scene.held:
         mesh = scene.bodies[held.body].mesh
         nodes = mesh.nodes_to_hold(held.surface)
         values = held.values(mesh.points[nodes])
+        largest = max(largest, np.abs(values).max())
         for other, theirs, given in known.setdefault(held.body, []):
             _, here, there = np.intersect1d(nodes, theirs, return_indices=True)
             apart = np.abs(values[here] - given[there])
-            wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(values[here]), np.abs(given[there])))
+            wrong = np.flatnonzero(apart > 1e-12 * largest)
             if len(wrong):
                 at = wrong[0]
                 raise InvalidInputError(
@@ -32,6 +34,24 @@ def require_agreement(scene: HeatScene) -> None:
                     "one of them as a function of points, or hold nodes that they do not share"
                 )
         known[held.body].append((held, nodes, values))
+
+
+def require_agreement_across_ties(scene: HeatScene, joints: Joints, held: np.ndarray) -> None:
+    """Raise where ties join nodes that are held at different temperatures, and nothing else.
+
+    `held`: temperatures of all nodes, NaN where free, (n_nodes,).
+    """
+    jump, known = joints.tied.jump, np.isfinite(held)
+    free = abs(jump) @ (~known).astype(float) > 1e-9  # what mortar rounds to is nothing
+    apart = np.where(free, 0.0, jump @ np.where(known, held, 0.0))
+    wrong = np.flatnonzero(np.abs(apart) > 1e-12 * np.abs(held[known]).max(initial=0.0))
+    if len(wrong):
+        tie, node = scene.ties[joints.tied.pair[wrong[0]]], joints.tied.slave[wrong[0]]
+        raise InvalidInputError(
+            f"temperatures that are held must agree where the tie of {tie.place} joins them, got "
+            f"{held[node]:g} and {held[node] - apart[wrong[0]]:g} at {scene.geometry.points[node]}: hold "
+            "nodes that the tie does not reach, or give one of them as a function of points"
+        )
 
 
 def require_temperatures(scene: HeatScene, joints: Joints, conductance: np.ndarray) -> None:

@@ -20,7 +20,7 @@ from fenics_contact.feti.torn import contact_and_tied_points
 from fenics_contact.heat.conductance import Touch
 from fenics_contact.heat.curvature import shells, stretch
 from fenics_contact.heat.rows import ConductingRows
-from fenics_contact.heat.scene import HeatScene
+from fenics_contact.heat.scene import HeatScene, ThermalContact
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,11 @@ def _described(scene: HeatScene, points: ContactPoints) -> tuple[np.ndarray, ...
         area[mine] *= scene.bodies[pair.slave.body].thickness * stretch(surface)[place]
         spread[mine], ratio[mine] = shells(surface, place, points.gap[mine])
         if not pair.between_bodies:
-            on_obstacle[mine], given = True, contact.temperature
-            name = f"the temperature of the obstacle of {contact.place}"
-            opposite[mine] = evaluate(name, given, places[mine], ()) if callable(given) else given
+            on_obstacle[mine], opposite[mine] = True, opposite_at(contact, places[mine])
     return area, opposite, on_obstacle, pressure, spread, ratio
+
+
+def opposite_at(contact: ThermalContact, points: np.ndarray) -> np.ndarray:
+    """Return the temperature of an obstacle at points of the slave, (n, dim), shape (n,)."""
+    given, name = contact.temperature, f"the temperature of the obstacle of {contact.place}"
+    return evaluate(name, given, points, ()) if callable(given) else np.full(len(points), given)

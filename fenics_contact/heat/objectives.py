@@ -170,6 +170,14 @@ class HeatObjective(ABC):
     def by_temperature(self, at: AtTemperatures) -> np.ndarray:
         """Return ∂J/∂T at the nodes of all bodies, replicated, (n_nodes,). Collective."""
 
+    def entering(self, at: AtTemperatures) -> np.ndarray:
+        """Return the factors with which heat that enters at nodes is part of J, (n_nodes,): none."""
+        return np.zeros(len(at.values))
+
+    def size(self, value: float, temperatures: np.ndarray) -> float:
+        """Return what errors of J are relative to, by default its size; `temperatures`: of all nodes."""
+        return abs(value)
+
 
 @dataclass(frozen=True)
 @checked()
@@ -199,6 +207,10 @@ class TemperatureMean(HeatObjective):
         weight, over = self._over(at)
         return np.asarray(weight * (over / (self.value(at) or 1.0)) ** (self.exponent - 1.0))
 
+    def size(self, value: float, temperatures: np.ndarray) -> float:
+        """Return the range of temperatures, whose zero may lie anywhere."""
+        return float(np.ptp(temperatures))
+
     def _over(self, at: AtTemperatures) -> tuple[np.ndarray, np.ndarray]:
         """Return weights whose sum is one, and T − T₀, one where they are zero."""
         weight = at.weights(self.body, self.surface)[int(self.exponent != 1.0)]
@@ -220,13 +232,17 @@ class HeatOfHeld(HeatObjective):
 
     def value(self, at: AtTemperatures) -> float:
         """Return the sum of the residuals."""
-        return float(at.residual[at.nodes(self.body, self.surface)].sum())
+        return float(self.entering(at) @ at.residual)
 
     def by_temperature(self, at: AtTemperatures) -> np.ndarray:
         """Return the rows of these nodes, summed."""
+        return at.transposed(self.entering(at))
+
+    def entering(self, at: AtTemperatures) -> np.ndarray:
+        """Return one at these nodes."""
         weight = np.zeros(len(at.values))
         weight[at.nodes(self.body, self.surface)] = 1.0
-        return at.transposed(weight)
+        return weight
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,13 @@ def make_plan(
     pairs = zip(places, geometry.contacts, strict=True)
     joints = [f"{place}; {pair_geometry(geometry, pair)}" for place, pair in pairs]
     joints += [f"{tie.place}; {in_words(tie)}" for tie in geometry.ties]
-    # Each subdomain keeps matrices of its own, of conduction and of all that it exchanges: three as measured.
-    memory = expected_memory(field, parts, ranks) + 3.0 * Rates().entry * float(parts.couplings @ parts.size)
+    memory = memory_of_heat(field, parts, ranks)
     return HeatPlan(effects, len(parts.size), unknowns, rows, memory, tuple(joints))
+
+
+def memory_of_heat(field: Scene, parts: Subdomains, ranks: int) -> float:
+    """Return the memory of all ranks together, [bytes].
+
+    Each subdomain keeps matrices of its own, of conduction and of all that it exchanges: three as measured.
+    """
+    return expected_memory(field, parts, ranks) + 3.0 * Rates().entry * float(parts.couplings @ parts.size)

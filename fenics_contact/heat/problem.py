@@ -23,7 +23,11 @@ from fenics_contact.feti.free_motions import free_motions
 from fenics_contact.feti.torn import NumberedRows, TornSystem, at_rest, numbered, with_contact
 from fenics_contact.heat.acceleration import CautiousAnderson
 from fenics_contact.heat.assembly import Assembly, Heated, Rate
-from fenics_contact.heat.determined import require_agreement, require_temperatures
+from fenics_contact.heat.determined import (
+    require_agreement,
+    require_agreement_across_ties,
+    require_temperatures,
+)
 from fenics_contact.heat.forms import HeatForms
 from fenics_contact.heat.joints import Joints
 from fenics_contact.heat.plausible import odd_values, warn_of
@@ -264,6 +268,8 @@ class _Iteration:
         """Return the torn system. Collective."""
         scene, comm = self.scene.field, decomposition.comm
         prescribed, _ = once_a_machine(comm, lambda: prescribed_along(scene, decomposition.tearing))
+        with together(comm):
+            require_agreement_across_ties(self.scene, self.joints, prescribed[:, 0])
         none = join_points([], scene.dim, decomposition.tearing.n_nodes)
         groups = with_contact(scene, decomposition, joints, none, prescribed)
         if last is None:

@@ -157,15 +157,17 @@ class ConductingBody:
             return np.sort(self.mesh.regions[list(self.mesh.regions)[number]])
         return np.arange(self.mesh.n_cells)
 
-    def conducted(self, points: np.ndarray, temperature: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-        """Return k ∇T at points of all cells, shape (n_cells, m, dim).
+    def conducted(
+        self, cells: np.ndarray, points: np.ndarray, temperature: np.ndarray, gradient: np.ndarray
+    ) -> np.ndarray:
+        """Return k ∇T at points of some cells, shape (n, m, dim).
 
-        `points`: (n_cells, m, dim); `temperature`: (n_cells, m); `gradient`: (n_cells, m, dim).
+        `cells`: their numbers, (n,); `points`: (n, m, dim); `temperature`: (n, m); `gradient`: (n, m, dim).
         """
         result = np.empty_like(gradient)
         for number, material in enumerate(self.materials):
-            cells = self.cells_of(number)
-            result[cells] = material.conducted(points[cells], temperature[cells], gradient[cells])
+            own = np.isin(cells, self.cells_of(number))
+            result[own] = material.conducted(points[own], temperature[own], gradient[own])
         return result
 
     def _facts(self) -> dict[str, Any]:

@@ -16,9 +16,9 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.heat.assembly import Heated
 from fenics_contact.heat.fields import HeatOnBodies
 from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.points_of_cells import PointsOfCells
 from fenics_contact.heat.scene import ConductingBody, HeatScene
-from fenics_contact.mesh.cell_types import CellType, cell_type_of, quadrature, shape_gradients, shape_values
-from fenics_contact.mesh.collapsed import as_hexahedra, places_of
+from fenics_contact.mesh.cell_types import CellType, cell_type_of, quadrature
 from fenics_contact.qp.solution import DualSolution
 
 
@@ -211,10 +211,8 @@ def flux_at(
     `cell`: its reference cell, in which `positions`, (n_points, dim), are; `temperature`: at the nodes of the
     body. Shapes are (n_cells, n_points, dim), (n_cells, n_points, n_nodes, dim) and (n_cells, n_points).
     """
-    mesh, shape, slopes = body.mesh, shape_values(cell, positions), shape_gradients(cell, positions)
-    at = places_of(mesh.points, mesh.cells)
-    nodal = as_hexahedra(temperature[mesh.cells], mesh.cells, mesh.dim)
-    jacobian = np.einsum("cai,qaj->cqij", at, slopes)
-    slopes = slopes @ np.linalg.inv(jacobian)
-    places, slope = np.einsum("qa,cai->cqi", shape, at), np.einsum("cqai,ca->cqi", slopes, nodal)
-    return -body.conducted(places, nodal @ shape.T, slope), slopes, np.abs(np.linalg.det(jacobian))
+    mesh, cells = body.mesh, np.arange(body.mesh.n_cells)
+    at = PointsOfCells.of(mesh, cells, cell, positions)
+    nodal = at.of_nodes(temperature[mesh.cells])
+    flux = -body.conducted(cells, at.places, nodal @ at.shape.T, np.einsum("cqai,ca->cqi", at.slopes, nodal))
+    return flux, at.slopes, at.volumes

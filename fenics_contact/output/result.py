@@ -251,7 +251,7 @@ def write_result(
     name: str = "result",
     more: Mapping[str, Any] | None = None,
     errors: bool = False,
-    accuracy: AccurateResult | None = None,
+    accuracy: AccurateResult[State] | None = None,
 ) -> Path:
     """Write a state, how it was computed and with which software. Collective.
 
@@ -361,7 +361,7 @@ def write_optimisation_result(
     *,
     name: str = "result",
     more: Mapping[str, Any] | None = None,
-    accuracy: AccurateResult | None = None,
+    accuracy: AccurateResult[State] | None = None,
 ) -> Path:
     """Write the result of an optimisation. Collective.
 
@@ -533,7 +533,7 @@ def _errors(errors: StateErrors) -> dict[str, Any]:
     }
 
 
-def _accuracy(result: AccurateResult) -> dict[str, Any]:
+def _accuracy(result: AccurateResult[State]) -> dict[str, Any]:
     names = list(vars(result.levels[0]))
     levels = {name: [readable(getattr(level, name)) for level in result.levels] for name in names}
     kept = {

@@ -103,9 +103,9 @@ def _costs(levels: Sequence[Level]) -> tuple[list[int], np.ndarray]:
 
 def _errors(levels: Sequence[Level], exact: float | None) -> list[np.ndarray]:
     """Return true relative errors, where they are known, and estimated ones; NaN where unknown or zero."""
-    value, error = (np.array([getattr(level, name) for level in levels]) for name in ("value", "error"))
     if exact is None:
-        return [_positive(error / np.abs(value))]
+        return [_positive(np.array([level.relative_error for level in levels]))]
+    value, error = (np.array([getattr(level, name) for level in levels]) for name in ("value", "error"))
     return [_positive(np.abs(value - exact) / abs(exact)), _positive(error / abs(exact))]
 
 

@@ -22,7 +22,7 @@ from fenics_contact import (
     solve_to,
     theory,
 )
-from fenics_contact._adaptive import levels
+from fenics_contact._adaptive import equilibrium
 from fenics_contact._adaptive.underresolved_contact import refined_at_spots, underresolved_pairs
 from fenics_contact.design import PeakPressure
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
@@ -118,7 +118,7 @@ def test_doubted_meshes_cost_no_adjoint(monkeypatch):
     def refuse(*_):
         raise AssertionError
 
-    monkeypatch.setattr(levels, "goal_error", refuse)
+    monkeypatch.setattr(equilibrium, "goal_error", refuse)
     found = solve_to(on_cylinder(1000.0), PeakPressure(), 0.1, MPI.COMM_SELF, limits=Limits(levels=1))
     assert found.value > 0.0
     resolved = replace(on_cylinder(1000.0), contacts=flat(5).contacts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 
 import numpy as np
@@ -9,7 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact import Surface, Tie, box_partition
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.heat import (
     ConductingBody,
     Conductor,
@@ -17,12 +18,14 @@ from fenics_contact.heat import (
     GapConductance,
     GapRadiation,
     HeatFlux,
+    HeatOfHeld,
     HeatScene,
     HeldTemperature,
     Radiation,
     TemperatureTable,
     ThermalContact,
     solve_heat,
+    solve_heat_to,
 )
 
 CUTS = ((1, 1, 2), (2, 1, 1), (3, 2, 2))
@@ -55,6 +58,16 @@ def scene(discretisation: str, above: Conductor) -> HeatScene:
     )
 
 
+def flat() -> HeatScene:
+    """Return two rectangles with a film between them, of a table and radiation."""
+    shapes = {"low": ((0.0, 0.0), (1.0, 1.0), (3, 3)), "up": ((0.2, 1.0), (1.0, 1.5), (4, 2))}
+    middle = Conductor(TemperatureTable((300.0, 900.0), (20.0, 60.0)))
+    bodies = {name: ConductingBody(rectangle(*given, "triangle"), middle) for name, given in shapes.items()}
+    heating = [HeatFlux("up", "y1", 5e3), Radiation("up", "x0", 0.8, 300.0)]
+    film = ThermalContact(Surface("up", "y0"), Surface("low", "y1"), 100.0)
+    return HeatScene(bodies, [HeldTemperature("low", "x0", 300.0)], heating, [film])
+
+
 def main() -> None:
     """Write counts and temperatures of all cuts, or what was refused, from the first rank."""
     comm, kind = MPI.COMM_WORLD, sys.argv[1]
@@ -65,6 +78,11 @@ def main() -> None:
         except InvalidInputError as error:
             every = comm.gather(str(error)) or []
             print(*every, sep="\n", end="\n" * bool(every))
+        return
+    if kind == "levels":
+        way = solve_heat_to(flat(), HeatOfHeld("low", "x0"), 0.01, comm)
+        if comm.rank == 0:
+            print(json.dumps([[level.cells for level in way.levels], way.value, way.error]))
         return
     for cut in CUTS:
         given = scene(kind, Conductor(5.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -156,6 +157,24 @@ def test_temperatures_that_meet_and_differ_are_named():
     along = HeldTemperature("a", "y0", lambda x: 1.0 + x[:, 0])
     state = solve_heat(HeatScene({"a": plate()}, [held[0], along]), MPI.COMM_SELF)
     assert state.values.max() == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("how", ["node", "mortar"])
+def test_temperatures_that_a_tie_joins_and_differ_are_named(how: Any):
+    bodies = {"a": plate(), "b": plate(1.0)}
+    held = [HeldTemperature("a", "y0", 1.0), HeldTemperature("b", "y0", 2.0)]
+    tie = Tie(Surface("a", "x1"), Surface("b", "x0"), discretisation=how)
+    words = r"the tie of a x1 on b x0 joins them, got 1 and 2 at \[1\. 0\.\]"
+    with pytest.raises(InvalidInputError, match=words):
+        solve_heat(HeatScene(bodies, held, ties=[tie]), MPI.COMM_SELF)
+    level = [held[0], replace(held[1], value=1.0)]
+    assert solve_heat(HeatScene(bodies, level, ties=[tie]), MPI.COMM_SELF).values == pytest.approx(1.0)
+
+
+def test_temperatures_that_differ_by_rounding_agree():
+    along = HeldTemperature("a", "y0", lambda x: np.sin(np.pi * x[:, 0]))
+    state = solve_heat(HeatScene({"a": plate()}, [along, HeldTemperature("a", "x1", 0.0)]), MPI.COMM_SELF)
+    assert state.values.max() == pytest.approx(np.sin(np.pi / 3.0))
 
 
 def test_a_function_of_held_temperatures_is_named_as_one():

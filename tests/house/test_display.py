@@ -144,6 +144,7 @@ from fenics_contact.heat import (
     TemperatureTable,
     ThermalContact,
     heat_adjoint,
+    heat_goal_error,
     heat_in_time,
 )
 from fenics_contact.materials import (
@@ -209,6 +210,7 @@ def objects() -> dict[str, Any]:
     partials = shape.objective.partials(state, shape.geometry.forms)
     limits = LinearConstraints(np.ones((40, 60)), np.ones(40))
     search = ForScipy(bowl, np.zeros(60), constraints=limits)
+    level = Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan, 1.1, 1.0)
     search.arguments("SLSQP")["fun"](np.zeros(60))
     weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
     sprung = SpringForce(np.eye(3)[2], np.array([0.1]), np.eye(3)[2:])
@@ -266,9 +268,9 @@ def objects() -> dict[str, Any]:
         LargestStress("block"), Movement("block", "z1", (1, 0, 0)),
         StressNear("block", (0, 0, 0), 1.0), MovementNear("block", (0, 0, 0), 1.0, direction=(1, 0, 0)),
         Maximum((LargestPressure(),)), PeakPressure(), goal_error(state, StrainEnergy()),
-        AccurateResult(state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan, 1.1),)),
+        AccurateResult(state, 1.0, 0.1, 0.01, False, "why", (level,)),
         AccurateDesign(
-            state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan, 1.1),), (shape,),
+            state, 1.0, 0.1, 0.01, False, "why", (level,), (shape,),
             (minimize(bowl, np.ones(60)),),
         ),
         TransferredState(state, {"block": MeshTransfer()}),
@@ -307,6 +309,7 @@ def heated(contact: ContactProblem, state: AnyState) -> list[Any]:
         FrictionHeat(0.3, lambda x: x[:, 0]), Radiation("a", "z0", 0.9, 300.0),
         Convection("a", "z0", TemperatureTable((0.0, 1.0), (1.0, 2.0)), 20.0), HeatSource("a", 1.0),
         HeatAtNodes("a", "z0", 1.0), heat_adjoint(warm, TemperatureMean("plate 0")),
+        heat_goal_error(warm, TemperatureMean("plate 0")),
         HeatOfContact(0), HeatOfHeld("plate 0", "z0"), JointResistance(0),
     ]  # fmt: skip
 

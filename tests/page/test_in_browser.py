@@ -55,7 +55,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     )
     steps = {"number": [0, 1], "name": ["first", "second"], **{name: [123.456, 65.4321] for name in numbers}}
     levels = [
-        Level(9 * k, 30 * k, 2.0, error, 7, 0.5, 0.4, 2.1) for k, error in ((1, np.inf), (2, 0.2), (4, 0.1))
+        Level(9 * k, 30 * k, 2.0, error, 7, 0.5, 0.4, 2.1, 2.0)
+        for k, error in ((1, np.inf), (2, 0.2), (4, 0.1))
     ]
     accurate = AccurateResult(state, 2.0, 0.1, 0.01, False, "as far as it goes", tuple(levels))
     write_result(state, folder, more={"title": "Two blocks", "steps": steps}, accuracy=accurate)

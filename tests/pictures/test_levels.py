@@ -17,7 +17,7 @@ from fenics_contact.pictures import canvas, plot_levels, plot_meshes
 from tests.pictures.states import painted, pixels
 
 LEVELS = [
-    Level(cells, 3 * cells, 5.0 + off, error, 9, 0.5, float("nan"), 5.0 + 2.0 * off)
+    Level(cells, 3 * cells, 5.0 + off, error, 9, 0.5, float("nan"), 5.0 + 2.0 * off, 5.0 + off)
     for cells, off, error in ((10, 1.0, float("inf")), (40, 0.5, 0.25), (160, 0.0, 0.05))
 ]
 
