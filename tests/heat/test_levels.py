@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Limits, Surface
+from fenics_contact import Level, Limits, Surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import disc, rectangle
 from fenics_contact.heat import (
     ConductingBody,
     Conductor,
     GapConductance,
+    HeatOfContact,
     HeatOfHeld,
     HeatProblem,
     HeatScene,
@@ -29,6 +30,7 @@ from fenics_contact.heat import (
     solve_heat_to,
 )
 from fenics_contact.heat.assembly import Rate
+from fenics_contact.heat.levels import _Levels
 from fenics_contact.mesh import quadratic
 from tests.conftest import run_on_ranks
 from tests.heat.random_bodies import scene_of
@@ -87,6 +89,31 @@ def test_facets_of_curved_bodies_are_part_of_the_error(slave: str) -> None:
     assert sum(found.by_cell(name).sum() for name in ("inner", "outer")) > abs(found.geometry)
 
 
+def across_a_film(n: int, width: float, thickness: float = 1.0) -> HeatScene:
+    """Return two bodies of quadratic cells with heat that varies along the film between them."""
+    shapes = {"lower": ((0.0, 0.0), (1.0, 1.0), (n, n)), "upper": ((0.0, 1.0), (width, 2.0), (n + 1, n))}
+    bodies = {
+        name: ConductingBody(quadratic(rectangle(*shape)), Conductor(k), thickness=thickness)
+        for (name, shape), k in zip(shapes.items(), (2.0, 1.0), strict=True)
+    }
+    held = [HeldTemperature("lower", "y0", 0.0), HeldTemperature("upper", "x1", 1.0)]
+    film = ThermalContact(Surface("lower", "y1"), Surface("upper", "y0"), 8.0)
+    return HeatScene(bodies, held, contacts=[film])
+
+
+@pytest.mark.parametrize(("width", "exact"), [(1.0, -0.902667), (0.73, -0.86995)])  # with 96 cells a side
+def test_sums_over_points_of_contact_are_part_of_the_error(width: float, exact: float) -> None:
+    cold = HeatOfHeld("lower", "y0")
+    rough, thick = (
+        heat_goal_error(solve_heat(across_a_film(6, width, t), MPI.COMM_SELF), cold) for t in (1.0, 3.0)
+    )
+    true = exact - rough.value
+    assert abs(true - rough.total) < 0.25 * abs(true)
+    assert rough.by_cell("lower").max() > 2.0 * rough.by_cell("upper").max()
+    assert rough.uncancelled < 1.6 * abs(rough.total)
+    assert [thick.value, thick.total] == pytest.approx([3.0 * rough.value, 3.0 * rough.total], rel=1e-6)
+
+
 def test_heat_of_rings_to_an_accuracy() -> None:
     for wanted in (1e-2, 1e-3):
         found = solve_heat_to(rings(2), HeatOfHeld("inner", "inner"), wanted, MPI.COMM_SELF)
@@ -142,6 +169,19 @@ def test_heat_between_different_temperatures_that_meet_grows_without_limit(
     assert len(found.levels) < 9
     assert "the value grows without limit" in found.reason
     assert "the accuracy asked for was not reached" in caplog.text
+
+
+def test_a_value_that_grows_while_its_error_falls_is_no_infinite_one() -> None:
+    level = Level(10, 10, 1.0, 0.5, 1, 0.1, 0.1, 1.0, 1.0)
+    for left, words in ((0.5, ""), (1.0, "an error of 50 %, and the value grows without limit")):
+        way = _Levels(HeatOfContact(0), 0.01, Limits(), MPI.COMM_SELF)
+        way.levels = [
+            replace(level, unknowns=10 * 2**k, state_value=1.0 + 0.1 * 1.2**k, error=0.5 * left ** (k - 5))
+            for k in range(6)
+        ]
+        way._corrected = [each.value for each in way.levels]
+        assert way._hopeless().startswith(words)
+        assert bool(way._hopeless()) == bool(words)
 
 
 def test_limits_end_the_way() -> None:
