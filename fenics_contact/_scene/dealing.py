@@ -54,7 +54,7 @@ class _Shares:
 
     `uneven`: by how much of its share of a body a rank may have more, rather than part of a kind; `known`:
     ranks that have some of a kind; `load`: seconds of each rank, `room`: what is left for it of its `share`
-    of the present body.
+    of the present body, `left`: seconds of it that are not dealt yet.
     """
 
     uneven: ClassVar[float] = 0.1
@@ -62,6 +62,7 @@ class _Shares:
     dealing: Dealing
     ranks: int
     share: float = 0.0
+    left: float = 0.0
     known: dict[int, list[int]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -79,7 +80,7 @@ class _Shares:
         alone = (counts == 1) & new
         # How often factors of others are made depends on how they are dealt.
         self.share = float(given.each[body].sum() + given.once[body[first]][alone].sum()) / self.ranks
-        self.room[:] = self.share
+        self.room[:], self.left = self.share, self.ranks * self.share
         groups = [body[which == k] for k in np.flatnonzero(~alone)]
         groups.sort(key=lambda group: -float(given.each[group].sum()))  # a stable sort
         rest = [self._to_known(group) for group in groups]
@@ -100,7 +101,7 @@ class _Shares:
         while len(group):
             rank = self._emptiest()
             once = float(given.once[group[0]])
-            over = float(given.each[group].sum()) - self.room[rank]
+            over = float(given.each[group].sum()) - self._open(rank)
             self.load[rank] += once
             self.known.setdefault(int(given.kind[group[0]]), []).append(rank)
             # To divide a kind has the price of its factors once more, in time and in memory.
@@ -118,6 +119,9 @@ class _Shares:
             spent = float(self.dealing.once[some[:count]].sum())
             self.room[rank] -= spent
             self.load[rank] += spent
+            self.left -= spent
+            for kind in self.dealing.kind[some[:count]].tolist():
+                self.known[kind] = [rank]  # those alike in bodies that follow go there, too
             some = self._give(rank, some, count)
 
     def _emptiest(self) -> int:
@@ -126,7 +130,15 @@ class _Shares:
         return int(most[np.argmin(self.load[most])])
 
     def _fitting(self, rank: int, group: np.ndarray) -> int:
-        return int(np.clip(self.room[rank] / self.dealing.each[group[0]] + 0.5, 0, len(group)))
+        return int(np.clip(self._open(rank) / self.dealing.each[group[0]] + 0.5, 0, len(group)))
+
+    def _open(self, rank: int) -> float:
+        """Return what a rank may get: less than its room where others have got more than their share."""
+        return (
+            float(self.room[rank])
+            * self.left
+            / max(np.maximum(self.room, 0.0).sum(), self.left, np.finfo(float).tiny)
+        )
 
     def _give(self, rank: int, group: np.ndarray, count: int) -> np.ndarray:
         """Give the first of some subdomains to a rank, and return the others."""
@@ -134,6 +146,7 @@ class _Shares:
         cost = float(self.dealing.each[group[:count]].sum())
         self.room[rank] -= cost
         self.load[rank] += cost
+        self.left -= cost
         return group[count:]
 
 

@@ -59,6 +59,11 @@ def test_what_is_alike_goes_together_also_in_other_bodies() -> None:
         assert np.bincount(dealt[cards.body == number]).tolist() == [4, 4]
 
 
+def test_what_is_alike_in_two_bodies_alone_goes_together() -> None:
+    cards = dealing([[3, 4, 0, 2, 1], [3, 4, 0, 2, 1]])
+    assert factored(cards.among(2), cards.kind) <= 6
+
+
 def test_neighbours_go_together_where_nothing_is_alike() -> None:
     dealt = dealing([list(range(8)), list(range(8, 14))]).among(2)
     assert dealt.tolist() == [0] * 4 + [1] * 4 + [0] * 3 + [1] * 3
