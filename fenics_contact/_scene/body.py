@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from inspect import signature
 from typing import Any, Literal, TypeAlias, cast
 
@@ -236,13 +237,14 @@ class Body:
         materials = ", ".join(type(each).__name__ for each in self.materials)
         return f"{self.mesh.cells_in_words} of {materials}{self.kinematics.in_words}"
 
-    @property
+    @cached_property
     def material_of_cells(self) -> np.ndarray:
         """Number of each cell's material in `materials`, shape (n_cells,)."""
         number = np.zeros(self.mesh.n_cells, dtype=np.int64)
         materials = self.materials
         for region, material in self._by_region.items():
             number[self.mesh.regions[region]] = materials.index(material)
+        number.setflags(write=False)
         return number
 
 

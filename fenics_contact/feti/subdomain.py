@@ -35,6 +35,7 @@ from fenics_contact.feti.following import AnyFollowing, Following
 from fenics_contact.feti.foundations import by_resistance, foundation_stiffness
 from fenics_contact.feti.nearby import ToleranceIndex
 from fenics_contact.materials.elastic import Material, is_isotropic
+from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import expanded
 from fenics_contact.mesh.faces import coordinate_rounding, corners_of, match_faces
 
@@ -124,6 +125,11 @@ class SubdomainMesh:
         """Return the blocks at the nodes of each of the cells, given those of the body, (n_cells, k)."""
         order = np.argsort(self.nodes)
         return np.asarray(order[np.searchsorted(self.nodes, cells[self.cells], sorter=order)])
+
+    def portion(self, whole: BodyMesh) -> np.ndarray:
+        """Return its cells among those of the body at each of its nodes, (n_blocks,)."""
+        own = np.bincount(self.blocks_of_cells(whole.cells).ravel(), minlength=len(self.nodes))
+        return np.asarray(own / whole.cells_at_nodes[self.nodes])
 
     def by_input_node(self, values: np.ndarray) -> np.ndarray:
         """Return values by input node of the dolfinx mesh of those by block, (n_blocks, ...)."""
@@ -441,13 +447,9 @@ def _by_thickness(
 def _at_points(load: PointForce, mesh: SubdomainMesh, body: Body) -> np.ndarray:
     """Return the share of a subdomain in forces at nodes, by dof: that of its cells among those at a node."""
     loaded = np.isin(mesh.nodes, body.mesh.nodes_of(load.nodes))
-    nodes = mesh.nodes[loaded]
-    own, every = (
-        np.bincount(cells.ravel(), minlength=body.mesh.n_nodes)[nodes]
-        for cells in (body.mesh.cells[mesh.cells], body.mesh.cells)
-    )
+    share = mesh.portion(body.mesh)[loaded, None]
     force = np.zeros((len(mesh.nodes), body.components))
-    force[loaded] = load.at(body.mesh.points[nodes], body.components) * (own / every)[:, None]
+    force[loaded] = load.at(body.mesh.points[mesh.nodes[loaded]], body.components) * share
     return force.ravel()
 
 

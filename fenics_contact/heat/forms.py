@@ -169,8 +169,7 @@ class Part:
 
     def _marked(self, number: int) -> Mapping[int, np.ndarray]:
         """Return the cells here of one of the materials of the body."""
-        own = np.isin(self.mesh.cells, self.body.cells_of(number))
-        return {LOADED: np.flatnonzero(own)}
+        return {LOADED: np.flatnonzero(self.field.material_of_cells[self.mesh.cells] == number)}
 
     def _bound(self, template: Template, given: Sequence[Property], fields: Fields, number: int) -> Any:
         """Return the matrix of a form on the cells of a material."""
@@ -244,9 +243,4 @@ class Part:
     @cached_property
     def portion(self) -> np.ndarray:
         """Its portion of what enters at each node: that of its cells among those there, shape (n,)."""
-        mesh, whole = self.mesh, self.body.mesh
-        own, every = (
-            np.bincount(cells.ravel(), minlength=whole.n_nodes)[mesh.nodes]
-            for cells in (whole.cells[mesh.cells], whole.cells)
-        )
-        return np.asarray(own / every)
+        return self.mesh.portion(self.body.mesh)

@@ -573,6 +573,11 @@ class BodyMesh:
         return boundary_faces(self.cells, self.dim, self.hanging)
 
     @cached_property
+    def cells_at_nodes(self) -> np.ndarray:
+        """Number of cells at each node, (n_nodes,)."""
+        return np.bincount(self.cells.ravel(), minlength=self.n_nodes)
+
+    @cached_property
     def linear(self) -> BodyMesh:
         """The linear cells through the same nodes; the mesh itself unless its cells are quadratic.
 
