@@ -89,26 +89,27 @@ def _computed(file: SceneFile, console: Console, resume: bool | None) -> Found:
 
 @_computed.register
 def _(file: HeatFile, console: Console, resume: bool | None) -> Found:
-    found: Any = file.solve()
     if file.steps:
-        return Found({file.title: _over_time(console, file, found)})
+        return Found({file.title: _over_time(console, file)})
+    found: Any = file.solve()
     _keep_heat(console, file, found, file.folder)
     return Found({file.title: found})
 
 
-def _over_time(console: Console, file: HeatFile, history: Any) -> Any:
-    """Print and write a `HeatHistory`, and return its last state. Collective."""
-    console.write(str(history))
-    kinds, series = file.document.output.files, _series(file)
-    for number, (time, state) in enumerate(zip(file.steps, history.states, strict=True)):
+def _over_time(console: Console, file: HeatFile) -> Any:
+    """Print and write states over time, and return the last one. Collective."""
+    kinds, series, rows = file.document.output.files, _series(file), list[tuple[float, Any]]()
+    for number, (time, state, heat) in enumerate(file.followed(console.write)):
         if file.document.output.field_files:
             series.add(state, time, f"time {time:g}")
         if "csv" in kinds and state.geometry.contacts:
             write_contact_table(state, file.folder / "contact" / f"step_{number:04d}.csv")
-    if "csv" in kinds:
-        write_heat_balance(history.states, file.folder / "steps.csv", file.steps)
-    write_result(history.states[-1], file.folder, more=_origin(file))
-    return history.states[-1]
+        rows += [(time, each) for each in heat]
+    if "csv" in kinds and rows:
+        times, warm = zip(*rows, strict=True)
+        write_heat_balance(warm, file.folder / "steps.csv", times)
+    write_result(state, file.folder, more=_origin(file))
+    return state
 
 
 def _series(file: SceneFile) -> ResultSeries:

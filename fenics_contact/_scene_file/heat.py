@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from fenics_contact._scene_file.reading import Builder, SceneFile, made_of
 from fenics_contact._scene_file.values import at_time, changes
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from fenics_contact.heat.scene import ConductingBody, HeatScene
     from fenics_contact.heat.state import HeatState
     from fenics_contact.heat.time import HeatHistory
+
+#: A time, a state on bodies, and what it has of heat.
+Timed: TypeAlias = tuple[float, Any, "Sequence[HeatState]"]
 
 
 class _HeatBuilder(Builder):
@@ -104,6 +107,13 @@ class HeatFile(SceneFile):
             if time is None:
                 return solve_heat(self.scene, self.comm, partitions=self.partitions, **fixed)
             return heat_in_time(self._at_time, self.comm, partitions=self.partitions, **time.options)
+
+    def followed(self, show: Callable[[str], None]) -> Iterator[Timed]:
+        """Yield times with their states, and what these have of heat. Collective."""
+        history: Any = self.solve()
+        show(str(history))
+        for time, state in zip(self.steps, history.states, strict=True):
+            yield time, state, [state]
 
     def _at_time(self, time: float) -> HeatScene:
         """Return the scene with its formulas in t at a time."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene_file.bodies import Shaped
+from fenics_contact._scene_file.document import Document
 from fenics_contact._scene_file.reading import SceneFile
-from fenics_contact._scene_file.source import Source
-from fenics_contact._scene_file.validation import validated
+from fenics_contact._scene_file.source import SceneFileError, Source
+from fenics_contact._scene_file.validation import validated, wrong_names
 from fenics_contact.decks.deck import Deck, read_deck
 from fenics_contact.decks.tables import write_tables
+from fenics_contact.decks.vocabulary import conducts
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.ranks import on_root_then_bcast
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
     from fenics_contact.results.state import State
 
 #: Tables of a scene file that a deck does not have; what it has are those of how it is solved and written.
-OWN = ("meshes", "materials", "bodies", "supports", "loads", "contacts", "ties", "steps", "design")
+OWN = ("meshes", "materials", "bodies", "supports", "loads", "contacts", "ties", "steps", "design", "heat")
 _NOTHING: dict[str, Any] = {
     "meshes": {"deck": {"file": "deck.inp"}},
     "materials": {"deck": {"young_modulus": 1.0, "poisson_ratio": 0.0}},
@@ -70,10 +73,28 @@ class DeckFile(SceneFile):
         return tuple(self.deck.steps) if len(self.deck.steps) > 1 else ()
 
 
-def read_deck_file(
+def read_deck_file(path: Path, comm: MPI.Comm, overrides: Sequence[str]) -> SceneFile:
+    """Read a deck for the command line, of statics alone or with heat. Collective on ``comm``."""
+    if not on_root_then_bcast(comm, lambda: conducts(path)):
+        return statics_file(path, comm, overrides)
+    from fenics_contact.decks.heat import read_heat_deck
+    from fenics_contact.decks.heat_file import NOTHING, HeatDeckFile
+
+    source, document = _with(path, overrides, NOTHING, HeatDeckFile.documents())
+    return HeatDeckFile(source, document, comm, read_heat_deck(path, comm))
+
+
+def statics_file(
     path: Path, comm: MPI.Comm, overrides: Sequence[str], read: Callable[[Path, MPI.Comm], Deck] = read_deck
 ) -> DeckFile:
-    """Read a deck for the command line. Collective on ``comm``."""
+    """Read a deck of statics for the command line. Collective on ``comm``."""
+    return DeckFile(*_with(path, overrides, _NOTHING, DeckFile.documents()), comm, read(path, comm))
+
+
+def _with(
+    path: Path, overrides: Sequence[str], data: Mapping[str, Any], kind: type[Document]
+) -> tuple[Source, Any]:
+    """Return what options say of solver, accuracy and output."""
     for override in overrides:
         key = override.partition("=")[0].strip().partition(".")[0]
         if key in OWN:
@@ -81,6 +102,8 @@ def read_deck_file(
                 f"--set changes solver, accuracy, output, units and title of a deck, got {override!r}: "
                 "make a scene file of it with `fenics-contact convert`"
             )
-    source = Source(path.name, path.parent, _NOTHING).with_overrides(overrides)
-    document = validated(source)
-    return DeckFile(source, document, comm, read(path, comm))
+    source = Source(path.name, path.parent, data).with_overrides(overrides)
+    document = validated(source, kind)
+    if wrong := wrong_names(source, document):
+        raise SceneFileError(source.name, wrong)
+    return source, document

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,12 +18,12 @@ from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.cards import DeckCards, Record
 from fenics_contact.decks.deck import Deck, deck_of, deck_with
 from fenics_contact.decks.heat_materials import conductance_of, conductor_of, read_conductances
-from fenics_contact.decks.heat_statics import moving, statics_of
+from fenics_contact.decks.heat_statics import Temperatures, moving, statics_of, warmer
 from fenics_contact.decks.heat_steps import Acting, HeatCards, Whole, heat_steps
 from fenics_contact.decks.names import names_of
 from fenics_contact.decks.pairs import pairs_of
 from fenics_contact.decks.steps import groups_of, read_steps
-from fenics_contact.decks.vocabulary import HEAT, HEAT_CARDS, HEAT_MODEL, KNOWN, PRINT_CARDS, refuse_unknown
+from fenics_contact.decks.vocabulary import HEAT_CARDS, HEAT_MODEL, KNOWN, PRINT_CARDS, refuse_unknown
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.heat.parts import HeldTemperature
@@ -91,7 +91,9 @@ class HeatDeck:
         last = {number: state for number, _, state in self.increments(comm, **settings)}
         return list(last.values())
 
-    def increments(self, comm: MPI.Comm, error: float = 1e-3) -> Iterator[tuple[int, float, HeatState]]:
+    def increments(
+        self, comm: MPI.Comm, error: float = 1e-3, **cut: Any
+    ) -> Iterator[tuple[int, float, HeatState]]:
         """Yield step, time since it began and state where steps end or amplitudes turn. Collective.
 
         Steps in time are as long as the deck says with DIRECT, by Euler's rule as there; else they err by no
@@ -100,11 +102,12 @@ class HeatDeck:
         Args:
             comm: Communicator.
             error: This part.
+            **cut: ``partitions``, as for `solve_heat`.
         """
         state: Any = self.initial
         for number, (cards, _) in enumerate(self.steps):
             if cards.steady:
-                state = solve_heat(self.scene(number), comm)
+                state = solve_heat(self.scene(number), comm, **cut)
                 yield number, cards.period, state
                 continue
             given = [
@@ -115,7 +118,7 @@ class HeatDeck:
             if cards.direct:
                 how = {"step": cards.first, "scheme": "euler"}
             history = heat_in_time(
-                partial(self.scene, number), comm, cards.period, state, outputs=cards.turns, **how
+                partial(self.scene, number), comm, cards.period, state, outputs=cards.turns, **how, **cut
             )
             for time, state in zip(history.times[1:], history.states, strict=True):
                 yield number, float(time), state
@@ -136,15 +139,29 @@ class HeatDeck:
             raise InvalidInputError(
                 f"the deck {self.frame.name} has no step in which bodies move: add *STATIC"
             )
-        found = {}
-        for (cards, _), state in zip(self.steps, states, strict=True):
-            own = [
-                (numbers[numbers > 0], state.temperature[body][numbers > 0])
-                for body, numbers in self.frame.node_numbers.items()
-            ]
-            numbers, values = (np.concatenate(each) for each in zip(*own, strict=True))
-            found[cards.number] = numbers, values
+        found = {
+            cards.number: self._by_number(state.temperature)
+            for (cards, _), state in zip(self.steps, states, strict=True)
+        }
         return deck_of(self.frame.name, list(statics_of(self._cards, found)), Record())
+
+    @cached_property
+    def mechanics(self) -> Sequence[Deck]:
+        """The deck of the steps in which bodies move, if any do, at no temperatures yet, and one more."""
+        cards = (list(warmer(self._cards, *self._by_number(self.initial))) for _ in self.moving[:1])
+        return [deck_of(self.frame.name, each, Record()) for each in cards]
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What is done otherwise than the deck says, and known cards without effect."""
+        return [*self.frame.notes, *(note for each in self.mechanics for note in each.notes)]
+
+    def _by_number(self, temperature: Mapping[str, np.ndarray]) -> Temperatures:
+        """Return numbers of nodes and their temperatures."""
+        nodes = self.frame.node_numbers.items()
+        own = [(numbers[numbers > 0], temperature[body][numbers > 0]) for body, numbers in nodes]
+        numbers, values = (np.concatenate(each) for each in zip(*own, strict=True))
+        return numbers, values
 
 
 @naming_arguments
@@ -171,11 +188,6 @@ def read_heat_deck(path: str | Path, comm: MPI.Comm | None = None) -> HeatDeck:
     return on_root_then_bcast(comm, lambda: _read(Path(path)))
 
 
-def conducts(path: Path) -> bool:
-    """Return whether a step of a deck conducts heat."""
-    return path.is_file() and any(card.name in HEAT for card in read_cards(path))
-
-
 def _read(path: Path) -> HeatDeck:
     require_file(path, "a deck")
     given = read_cards(path)
@@ -197,7 +209,9 @@ def _read(path: Path) -> HeatDeck:
         deck.mesh, deck.sections, deck.of_element, deck.components, sets
     )
     deck = replace(deck, mesh=mesh, sections=sections, of_element=of_element, components=parts)
-    return replace(_Builder(deck, cards, steps).made(), moving=moves, _cards=given)
+    made = replace(_Builder(deck, cards, steps).made(), moving=moves, _cards=given)
+    _ = made.notes  # refuses mechanics before anything is solved
+    return made
 
 
 def _solid(card: Card) -> Card:

@@ -60,6 +60,10 @@ class HeatResults(DeckResults):
             found.append(FrdField(kind, self.numbering.mesh.numbers, values))
         return found
 
+    def progress(self, state: HeatState) -> tuple[int, float, int]:
+        """Return the number of linear systems, the relative residual of the last, and no closed points."""
+        return state.iterations, float(state.solution.natural_residual), 0
+
     def tables(self, state: HeatState, time: float) -> Tables:
         """Return what makes the tables of a state."""
         return HeatTables(self, state, time)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact.decks.heat_steps import procedure_of
 from fenics_contact.decks.steps import groups_of
-from fenics_contact.decks.vocabulary import HEAT, HEAT_ALONE, PARAMETERS
+from fenics_contact.decks.vocabulary import HEAT, HEAT_ALONE, HEAT_ONLY, PARAMETERS
 from fenics_contact.readers.deck_cards import Card
 
 #: Numbers of nodes and their temperatures.
@@ -45,8 +45,19 @@ def statics_of(cards: Sequence[Card], found: Mapping[int, Temperatures]) -> Iter
             last = [k for k in found if k <= number]
             if last:
                 yield _given(card, *found[max(last)])
-        elif card.name not in HEAT_ALONE:
+        elif card.name not in HEAT_ALONE | HEAT_ONLY:
             yield card
+
+
+def warmer(cards: Sequence[Card], numbers: np.ndarray, values: np.ndarray) -> Iterator[Card]:
+    """Yield the cards of mechanics with one more step of other temperatures: bodies will be heated."""
+    found = [*statics_of(cards, {})]
+    yield from found
+    head, static, end = (
+        [card for card in found if card.name == name][-1] for name in ("STEP", "STATIC", "ENDSTEP")
+    )
+    known = {key: text for key, text in head.parameters.items() if key == "NLGEOM"}
+    yield from (replace(head, parameters=known), static, _given(static, numbers, values + 1.0), end)
 
 
 def _given(card: Card, numbers: np.ndarray, values: np.ndarray) -> Card:

@@ -12,12 +12,12 @@ from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.files import hidden_folder
 from fenics_contact._equilibrium.steps import LoadSequence
 from fenics_contact.decks.deck import read_deck
-from fenics_contact.decks.heat import HeatDeck, conducts, read_heat_deck
-from fenics_contact.decks.heat_results import HeatResults
-from fenics_contact.decks.results import DeckResults, exponential
+from fenics_contact.decks.heat import HeatDeck, read_heat_deck
+from fenics_contact.decks.heat_course import course, results_of
+from fenics_contact.decks.results import Computed, DeckResults, exponential
+from fenics_contact.decks.vocabulary import conducts
 from fenics_contact.errors import together
 from fenics_contact.errors.ranks import on_root_then_bcast
-from fenics_contact.heat.state import HeatState
 from fenics_contact.output.files import OutputError, write_text
 from fenics_contact.output.frd import add_on_first, writing
 
@@ -113,19 +113,15 @@ def run_job(
             _clear(given, list(files.values()))
     if on_root_then_bcast(comm, lambda: conducts(given)):
         heat = read_heat_deck(given, comm)
-        results: DeckResults = HeatResults(heat.frame)
-        increments = _of_heat(heat, comm, settings, note)
+        known, notes = results_of(heat), heat.notes
+        increments = _of_heat(heat, comm, settings)
     else:
-        results = DeckResults(read_deck(given, comm))
-        increments = _of_statics(results, comm, settings, list[Increment]())
-    _note(results, note)
-    _solve(increments, results, comm, files, watch)
-    return list(files.values())
-
-
-def _note(results: DeckResults, note: Callable[[str], None]) -> None:
-    for words in (*results.deck.notes, *results.notes):
+        known = [DeckResults(read_deck(given, comm))]
+        notes, increments = known[0].deck.notes, _of_statics(known[0], comm, settings)
+    for words in dict.fromkeys([*notes, *(each for results in known for each in results.notes)]):
         note(words)
+    _solve(increments, known[0], comm, files, watch)
+    return list(files.values())
 
 
 def _clear(deck: Path, files: list[Path]) -> None:
@@ -143,48 +139,29 @@ def _clear(deck: Path, files: list[Path]) -> None:
         ) from error
 
 
-#: Results, the state of an increment, its step among those of the results, from 0, and the increment.
-Solved: TypeAlias = Iterator[tuple[DeckResults, Any, int, Increment]]
+#: What was computed in an increment, and the increment.
+Solved: TypeAlias = Iterator[tuple[Sequence[Computed], Increment]]
 
 
-def _of_statics(
-    results: DeckResults,
-    comm: MPI.Comm,
-    settings: dict[str, Any],
-    solved: list[Increment],
-    of: Sequence[tuple[int, float]] = (),
-) -> Solved:
-    """Yield the states of all increments as they are solved. Collective.
-
-    `solved`: those before; `of`: numbers of the steps in the deck, and time of others before each.
-    """
-    deck = results.deck
-    sequence, start = LoadSequence(deck.problem(comm, **settings), count=len(deck.steps)), len(solved)
+def _of_statics(results: DeckResults, comm: MPI.Comm, settings: dict[str, Any]) -> Solved:
+    """Yield the states of all increments as they are solved. Collective."""
+    deck, solved = results.deck, list[Increment]()
+    sequence = LoadSequence(deck.problem(comm, **settings), count=len(deck.steps))
     for step, load in zip(deck.step_of, deck.steps, strict=True):
         state = sequence.advance(load)
-        number, shift = of[step] if of else (step, 0.0)
-        time = shift + (float(len(solved) - start + 1) if load.time is None else float(load.time))
-        residual, closed = float(state.solution.natural_residual), int((state.contact.status != 0).sum())
-        solved.append(_increment(number, time, int(state.counts["solver_steps"]), residual, closed, solved))
-        yield results, state, step, solved[-1]
+        time = float(len(solved) + 1) if load.time is None else float(load.time)
+        new = [Computed(results, state, step)]
+        solved.append(_increment(step, time, new, solved))
+        yield new, solved[-1]
     sequence.finish()
 
 
-def _of_heat(deck: HeatDeck, comm: MPI.Comm, settings: dict[str, Any], note: Callable[[str], None]) -> Solved:
-    """Yield the temperatures of all increments as they are solved, then what they do. Collective."""
-    solved, results, ends = list[Increment](), HeatResults(deck.frame), dict[int, HeatState]()
-    for step, time, state in deck.increments(comm):
-        cards, residual = deck.steps[step][0], float(state.solution.natural_residual)
-        end = cards.start + time
-        solved.append(_increment(cards.number, end, state.iterations, residual, 0, solved))
-        ends[step] = state
-        yield results, state, cards.number, solved[-1]
-    if deck.moving:
-        statics = DeckResults(deck.statics(list(ends.values())))
-        _note(statics, note)
-        alone = [cards for cards, _ in deck.steps if cards.number not in deck.moving]
-        of = [(n, sum(cards.period for cards in alone if cards.number < n)) for n in deck.moving]
-        yield from _of_statics(statics, comm, settings, solved, of)
+def _of_heat(deck: HeatDeck, comm: MPI.Comm, settings: dict[str, Any]) -> Solved:
+    """Yield temperatures, and what they do to bodies, of all increments as they are solved. Collective."""
+    solved = list[Increment]()
+    for moment in course(deck, comm, settings):
+        solved.append(_increment(moment.step, moment.time, moment.new, solved))
+        yield moment.new, solved[-1]
 
 
 def _solve(
@@ -201,7 +178,7 @@ def _solve(
         writer = stack.enter_context(writing(comm, files[".frd"], results.written, materials))
         while True:
             try:
-                own, state, step, last = next(increments)
+                new, last = next(increments)
             except StopIteration:
                 break
             except Exception as error:
@@ -210,8 +187,9 @@ def _solve(
                 failures.append(error)
                 break
             solved.append(last)
-            printed.append(own.printout(state, step, last.time))
-            add_on_first(comm, writer, own.nodal(state, step), last.time, last.step, last.number)
+            printed += [each.printout(last.time) for each in new]
+            fields = [field for own, state, step in new for field in own.nodal(state, step)]
+            add_on_first(comm, writer, fields, last.time, last.step, last.number)
             _write_lines(comm, files, solved)
             watch(last)
     with together(comm):
@@ -221,14 +199,15 @@ def _solve(
         raise failure
 
 
-def _increment(
-    step: int, time: float, iterations: int, residual: float, contacts: int, before: list[Increment]
-) -> Increment:
+def _increment(step: int, time: float, new: Sequence[Computed], before: list[Increment]) -> Increment:
     """Return the increment that ends at a time since the first step."""
+    iterations, residuals, contacts = zip(*(own.progress(state) for own, state, _ in new), strict=True)
     number = 1 + sum(each.step == step + 1 for each in before)
     start = max((each.time for each in before if each.step <= step), default=0.0)
     last = max((each.time for each in before if each.time < time), default=0.0)
-    return Increment(step + 1, number, iterations, time, time - start, time - last, residual, contacts)
+    return Increment(
+        step + 1, number, sum(iterations), time, time - start, time - last, max(residuals), sum(contacts)
+    )
 
 
 def _write_lines(comm: MPI.Comm, files: dict[str, Path], solved: list[Increment]) -> None:

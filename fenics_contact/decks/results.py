@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -30,10 +30,12 @@ from fenics_contact.results.fields import ContactNodes, in_space
 class DeckResults:
     """The results of a deck by its own numbers, by what it asks for.
 
-    What a card asks for holds in later steps, too, until another card of its kind.
+    What a card asks for holds in later steps, too, until another card of its kind. `others`: variables that
+    other results of the deck have.
     """
 
     deck: Deck
+    others: Sequence[str] = ()
 
     #: Kinds of fields by card and variable.
     kinds: ClassVar[Mapping[str, Mapping[str, str]]] = {
@@ -118,7 +120,7 @@ class DeckResults:
         found = [f"elements {block.element.name} are not in .frd" for block in blocks if not has_type(block)]
         for each in self.deck.prints:
             place = f"*{each.card}, {each.origin.file} line {each.origin.line}: "
-            if rest := [name for name in each.variables if name[:4] not in known[_plain(each)]]:
+            if rest := [v for v in each.variables if v[:4] not in known[_plain(each)] | {*self.others}]:
                 found.append(f"{place}{', '.join(rest)} not written")
             nodes = self.deck.node_sets.get(each.where, self.numbering.mesh.numbers)
             alone = np.setdiff1d(nodes, [*self.numbering.mesh.numbers, *self.shells_among(nodes)])
@@ -156,6 +158,11 @@ class DeckResults:
         rows = rows[np.isin(rows[:, 0], self.written.numbers)]
         return FrdField(of.kind, rows[:, 0].astype(np.int64), rows[:, 1:])
 
+    def progress(self, state: Any) -> tuple[int, float, int]:
+        """Return the steps of the solver, their relative residual, and the number of closed points."""
+        closed = int((state.contact.status != 0).sum())
+        return int(state.counts["solver_steps"]), float(state.solution.natural_residual), closed
+
     def tables(self, state: Any, time: float) -> Tables:
         """Return what makes the tables of a state."""
         return Tables(self, state, time)
@@ -171,6 +178,18 @@ class DeckResults:
             if variable in self.printed[card]
             for text in tables.of(each, variable)
         )
+
+
+class Computed(NamedTuple):
+    """A state with what its deck asks for, in a step of this deck, from 0."""
+
+    of: DeckResults
+    state: Any
+    step: int
+
+    def printout(self, time: float) -> str:
+        """Return its tables of the printed file. Collective."""
+        return self.of.printout(self.state, self.step, time)
 
 
 def has_type(block: Block) -> bool:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence, Set
+from pathlib import Path
 
+from fenics_contact.readers.deck_assembly import read_cards
 from fenics_contact.readers.deck_cards import Card, DeckError
 from fenics_contact.readers.deck_elements import element_of
 from fenics_contact.readers.deck_links import is_of_links
@@ -98,6 +100,8 @@ HEAT_MODEL = MESH_CARDS | {
 }  # fmt: skip
 #: Cards that are of heat alone.
 HEAT_ALONE = {"DFLUX", "FILM", "RADIATE", "CFLUX", "GAPCONDUCTANCE"}
+#: Known cards that have no effect on mechanics, but on heat.
+HEAT_ONLY = {"CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS"}
 #: Cards of steps that conduct heat, and of what they have.
 HEAT_CARDS = HEAT | HEAT_ALONE | {"HEADING", "STEP", "ENDSTEP", "BOUNDARY", "AMPLITUDE", "PHYSICALCONSTANTS"}
 #: Parameters of the cards that are read; any other one is refused.
@@ -176,6 +180,11 @@ STRUCTURES = {
     },
     "GAPHEATGENERATION": "heat of friction is not read: give it by FrictionHeat in Python",
 }
+
+
+def conducts(path: Path) -> bool:
+    """Return whether a step of a deck conducts heat."""
+    return path.is_file() and any(card.name in HEAT for card in read_cards(path))
 
 
 def refuse_unknown(cards: Sequence[Card], known: Set[str] = KNOWN | PROCEDURES) -> None:
