@@ -129,11 +129,10 @@ def scene_command(
             overrides = [*(settings or ()), *_asked(accuracy, of), *_overridden(tolerance, output)]
             if scene.suffix.lower() in DECKS:
                 from fenics_contact.decks.deck import read_deck
-                from fenics_contact.decks.file import read_deck_file, statics_file
+                from fenics_contact.decks.file import read_deck_file
 
-                where = scene, console.comm, overrides
-                leading = partial(read_deck, statics_only=True)
-                file = statics_file(*where, leading) if statics_only else read_deck_file(*where)
+                read = partial(read_deck, statics_only=True) if statics_only else read_deck
+                file = read_deck_file(scene, console.comm, overrides, read)
             elif statics_only:
                 raise InvalidInputError(f"--statics-only is of decks, got the scene file {str(scene)!r}")
             else:

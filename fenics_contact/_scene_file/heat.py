@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from fenics_contact._scene_file.reading import Builder, SceneFile, made_of
 from fenics_contact._scene_file.values import at_time, changes
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from fenics_contact.heat.scene import ConductingBody, HeatScene
     from fenics_contact.heat.state import HeatState
     from fenics_contact.heat.time import HeatHistory
-
-#: A time, a state on bodies, and what it has of heat.
-Timed: TypeAlias = tuple[float, Any, "Sequence[HeatState]"]
 
 
 class _HeatBuilder(Builder):
@@ -108,7 +105,7 @@ class HeatFile(SceneFile):
                 return solve_heat(self.scene, self.comm, partitions=self.partitions, **fixed)
             return heat_in_time(self._at_time, self.comm, partitions=self.partitions, **time.options)
 
-    def followed(self, show: Callable[[str], None]) -> Iterator[Timed]:
+    def followed(self, show: Callable[[str], None]) -> Iterator[tuple[float, Any, list[HeatState]]]:
         """Yield times with their states, and what these have of heat. Collective."""
         history: Any = self.solve()
         show(str(history))

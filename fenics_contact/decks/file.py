@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene_file.bodies import Shaped
-from fenics_contact._scene_file.document import Document
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import SceneFileError, Source
 from fenics_contact._scene_file.validation import validated, wrong_names
@@ -41,11 +40,6 @@ class DeckFile(SceneFile):
     deck: Deck
 
     @property
-    def name(self) -> str:
-        """The file's name without suffix."""
-        return Path(self.deck.name).stem
-
-    @property
     def notes(self) -> Sequence[str]:
         """What is done otherwise than the deck says, and known cards without effect."""
         return self.deck.notes
@@ -73,28 +67,10 @@ class DeckFile(SceneFile):
         return tuple(self.deck.steps) if len(self.deck.steps) > 1 else ()
 
 
-def read_deck_file(path: Path, comm: MPI.Comm, overrides: Sequence[str]) -> SceneFile:
-    """Read a deck for the command line, of statics alone or with heat. Collective on ``comm``."""
-    if not on_root_then_bcast(comm, lambda: conducts(path)):
-        return statics_file(path, comm, overrides)
-    from fenics_contact.decks.heat import read_heat_deck
-    from fenics_contact.decks.heat_file import NOTHING, HeatDeckFile
-
-    source, document = _with(path, overrides, NOTHING, HeatDeckFile.documents())
-    return HeatDeckFile(source, document, comm, read_heat_deck(path, comm))
-
-
-def statics_file(
+def read_deck_file(
     path: Path, comm: MPI.Comm, overrides: Sequence[str], read: Callable[[Path, MPI.Comm], Deck] = read_deck
-) -> DeckFile:
-    """Read a deck of statics for the command line. Collective on ``comm``."""
-    return DeckFile(*_with(path, overrides, _NOTHING, DeckFile.documents()), comm, read(path, comm))
-
-
-def _with(
-    path: Path, overrides: Sequence[str], data: Mapping[str, Any], kind: type[Document]
-) -> tuple[Source, Any]:
-    """Return what options say of solver, accuracy and output."""
+) -> SceneFile:
+    """Read a deck for the command line, of statics or with heat. Collective on ``comm``."""
     for override in overrides:
         key = override.partition("=")[0].strip().partition(".")[0]
         if key in OWN:
@@ -102,8 +78,16 @@ def _with(
                 f"--set changes solver, accuracy, output, units and title of a deck, got {override!r}: "
                 "make a scene file of it with `fenics-contact convert`"
             )
-    source = Source(path.name, path.parent, data).with_overrides(overrides)
-    document = validated(source, kind)
+    made: Callable[..., SceneFile] = DeckFile
+    reader: Callable[..., object] = read
+    form, data = DeckFile.documents(), _NOTHING
+    if read is read_deck and on_root_then_bcast(comm, lambda: conducts(path)):
+        from fenics_contact.decks.heat import read_heat_deck
+        from fenics_contact.decks.heat_file import NOTHING, HeatDeckFile
+
+        made, form, data, reader = HeatDeckFile, HeatDeckFile.documents(), NOTHING, read_heat_deck
+    source = Source(path.name, path.parent, data, "\n").with_overrides(overrides)
+    document = validated(source, form)
     if wrong := wrong_names(source, document):
         raise SceneFileError(source.name, wrong)
-    return source, document
+    return made(source, document, comm, reader(path, comm))

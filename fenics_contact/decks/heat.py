@@ -13,11 +13,12 @@ import numpy as np
 
 from fenics_contact._base.checks import naming_arguments, require_file
 from fenics_contact._base.display import displayed
-from fenics_contact._scene.pairs import Surface, Tie
+from fenics_contact._scene.pairs import Tie
 from fenics_contact.decks.bodies import DeckBodies
 from fenics_contact.decks.cards import DeckCards, Record
 from fenics_contact.decks.deck import Deck, deck_of, deck_with
-from fenics_contact.decks.heat_materials import conductance_of, conductor_of, read_conductances
+from fenics_contact.decks.heat_coupled import EVERYWHERE, both_ways
+from fenics_contact.decks.heat_materials import conductor_of, passage_of, read_passages
 from fenics_contact.decks.heat_statics import Temperatures, moving, statics_of, warmer
 from fenics_contact.decks.heat_steps import Acting, HeatCards, Whole, heat_steps
 from fenics_contact.decks.names import names_of
@@ -86,24 +87,27 @@ class HeatDeck:
         loads = [each.at(factors) for each in placed if each.of.make is not HeldTemperature]
         return HeatScene(self.bodies, held, loads, self.contacts, self.ties)
 
-    def solve(self, comm: MPI.Comm, **settings: Any) -> list[HeatState]:
+    def solve(self, comm: MPI.Comm, **settings: Any) -> list[Any]:
         """Compute the state at the end of each step. Collective; settings are those of `increments`."""
         last = {number: state for number, _, state in self.increments(comm, **settings)}
         return list(last.values())
 
-    def increments(
-        self, comm: MPI.Comm, error: float = 1e-3, **cut: Any
-    ) -> Iterator[tuple[int, float, HeatState]]:
+    def increments(self, comm: MPI.Comm, error: float = 1e-3, **cut: Any) -> Iterator[tuple[int, float, Any]]:
         """Yield step, time since it began and state where steps end or amplitudes turn. Collective.
 
         Steps in time are as long as the deck says with DIRECT, by Euler's rule as there; else they err by no
-        more than a part of the range of temperatures that are given.
+        more than a part of the range of temperatures that are given. Where contact acts on heat each is half
+        as long again as the one before, up to the longest of the deck, and states are `HeatedState`.
 
         Args:
             comm: Communicator.
             error: This part.
             **cut: ``partitions``, as for `solve_heat`.
         """
+        if self.acts_back:
+            every = [each for each, _ in self.steps]
+            yield from both_ways(self.mechanics[0], self.scene, every, self.initial, comm, **cut)
+            return
         state: Any = self.initial
         for number, (cards, _) in enumerate(self.steps):
             if cards.steady:
@@ -135,21 +139,28 @@ class HeatDeck:
         Raises:
             InvalidInputError: If bodies move in no step.
         """
-        if not self.moving:
+        if not self.moving or self.acts_back:
             raise InvalidInputError(
-                f"the deck {self.frame.name} has no step in which bodies move: add *STATIC"
+                f"the deck {self.frame.name} has no step in which bodies move at temperatures known before: "
+                "add *STATIC; where contact acts on heat states have both"
             )
         found = {
             cards.number: self._by_number(state.temperature)
             for (cards, _), state in zip(self.steps, states, strict=True)
         }
-        return deck_of(self.frame.name, list(statics_of(self._cards, found)), Record())
+        return deck_of(self.frame.name, list(statics_of(self._cards, found, {})), Record())
 
     @cached_property
     def mechanics(self) -> Sequence[Deck]:
         """The deck of the steps in which bodies move, if any do, at no temperatures yet, and one more."""
-        cards = (list(warmer(self._cards, *self._by_number(self.initial))) for _ in self.moving[:1])
+        times = {cards.number: cards.ends for cards, _ in self.steps} if self.acts_back else {}
+        cards = (list(warmer(self._cards, *self._by_number(self.initial), times)) for _ in self.moving[:1])
         return [deck_of(self.frame.name, each, Record()) for each in cards]
+
+    @property
+    def acts_back(self) -> bool:
+        """Whether pressures, gaps or friction of bodies that move act on heat."""
+        return bool(self.contacts) and any(cards.number in self.moving for cards, _ in self.steps)
 
     @property
     def notes(self) -> Sequence[str]:
@@ -211,6 +222,12 @@ def _read(path: Path) -> HeatDeck:
     deck = replace(deck, mesh=mesh, sections=sections, of_element=of_element, components=parts)
     made = replace(_Builder(deck, cards, steps).made(), moving=moves, _cards=given)
     _ = made.notes  # refuses mechanics before anything is solved
+    for card in cards if made.acts_back else ():
+        if card.name in ("HEATTRANSFER", "STATIC", "MODELCHANGE", "CHANGEFRICTION"):
+            raise card.error(
+                "does not go with contact that acts on heat: give *COUPLED TEMPERATURE-DISPLACEMENT in all "
+                "steps, with the same pairs and friction"
+            )
     return made
 
 
@@ -235,6 +252,7 @@ class _Builder:
         self.deck, self.cards, self.steps = deck, cards, steps
         names, self.known = names_of(deck, read_steps(deck.cards, deck.mesh)), dict[bytes, str]()
         surfaces, node_sets = dict(names.surfaces), dict(names.node_sets)
+        node_sets[EVERYWHERE] = np.arange(len(deck.mesh.points))
         for each in (each for step in steps for each in step.acting):
             if each.at.sides[0] == Whole.NODE:
                 node_sets[self._name(each)] = each.at.elements
@@ -280,18 +298,18 @@ class _Builder:
 
     def _contacts(self) -> tuple[list[ThermalContact], list[Tie]]:
         """Return contact pairs with a conductance, and ties."""
-        deck, pairs, laws = self.deck, pairs_of(self.built), read_conductances(self.cards)
+        deck, pairs, known = self.deck, pairs_of(self.built), read_passages(self.cards)
         size, contacts, ties = float(np.ptp(deck.mesh.points, axis=0).max()), [], []
         for of, pair in pairs.contacts:
-            law = laws.get(of.card.name_of("INTERACTION"))
-            if law is None:
+            laws = known.get(of.card.name_of("INTERACTION"), {})
+            if not laws.keys() - {"FRICTION"}:
                 deck.note(of.card, "passes no heat: its interaction has no *GAP CONDUCTANCE")
-            elif any(step.card.name != "HEATTRANSFER" for step in self.steps):
-                words = "pressures of mechanics act on heat: solve both by solve_heated in Python"
-                raise law.error(words)
-            elif isinstance(pair.master, Surface):
-                made = conductance_of(law, max(pair.adjust or 0.0, 1e-4 * size))
-                contacts.append(ThermalContact(pair.slave, pair.master, made))
+                continue
+            passage = passage_of(laws, max(pair.adjust or 0.0, 1e-4 * size))
+            contacts.append(ThermalContact(pair.slave, pair.master, **passage))
+        for step in self.steps if contacts else ():
+            if step.card.name.startswith("UNCOUPLED"):
+                deck.note(step.card, "contact acts on heat, both are solved until they agree")
         for of, tie in pairs.ties:
             if not isinstance(tie, Tie):
                 raise of.error("sectors around an axis do not conduct heat here: mesh all of it")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from fenics_contact._equilibrium.steps import LoadSequence
 from fenics_contact.decks.heat import HeatDeck
@@ -14,17 +14,8 @@ from fenics_contact.heat.state import HeatState
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-
-class Moment(NamedTuple):
-    """What is found at a time since the first step, in a step of the deck from 0.
-
-    `heat`: the temperatures, none before the first step that conducts heat; `new`: them, and moved bodies.
-    """
-
-    step: int
-    time: float
-    heat: Sequence[HeatState]
-    new: Sequence[Computed]
+#: Step of the deck from 0, time since the first one, and what is known: temperatures, if any, moved bodies.
+Moment: TypeAlias = tuple[int, float, list[Computed]]
 
 
 def results_of(deck: HeatDeck) -> list[DeckResults]:
@@ -42,25 +33,30 @@ def course(deck: HeatDeck, comm: MPI.Comm, settings: Mapping[str, Any]) -> Itera
     """
     results, *moving = results_of(deck)
     ends, waiting = dict[int, HeatState](), list[Moment]()
-    for number, time, state in deck.increments(comm, partitions=settings.get("partitions")):
-        cards = deck.steps[number][0]
-        ends[cards.number], new = state, [Computed(results, state, cards.number)]
-        if cards.number not in deck.moving or time < cards.period:  # else bodies are still to be moved
-            waiting.append(Moment(cards.number, cards.start + time, [state], new))
+    state: Any
+    for place, at, state in deck.increments(comm, partitions=settings.get("partitions")):
+        cards = deck.steps[place][0]
+        number, time = cards.number, cards.start + at
+        if deck.acts_back:
+            both = (results, state.heat), (moving[0], state.mechanics)
+            yield number, time, [Computed(*each, number) for each in both]
+            continue
+        ends[number] = state
+        if number not in deck.moving or at < cards.period:  # else bodies are still to be moved
+            waiting.append((number, time, [Computed(results, state, number)]))
         if not moving:
             yield waiting.pop()
-    for moved in moving:
+    for moved in () if deck.acts_back else moving:
         statics = deck.statics(list(ends.values()))
         sequence = LoadSequence(statics.problem(comm, **settings), count=len(statics.steps))
         for place, load in zip(statics.step_of, statics.steps, strict=True):
             number = deck.moving[place]
             alone = [cards for cards, _ in deck.steps if cards.number not in deck.moving]
             time = float(load.time or 0.0) + sum(cards.period for cards in alone if cards.number < number)
-            while waiting and waiting[0].time < time:
+            while waiting and waiting[0][1] < time:
                 yield waiting.pop(0)
-            step: Any = sequence.advance(load)
-            heat = [own for k, own in ends.items() if k <= number][-1:]
-            new = [*(Computed(results, own, number) for own in heat), Computed(moved, step, place)]
-            yield Moment(number, time, heat, new)
+            state = sequence.advance(load)
+            warm = [Computed(results, own, number) for k, own in ends.items() if k <= number]
+            yield number, time, [*warm[-1:], Computed(moved, state, place)]
         sequence.finish()
     yield from waiting

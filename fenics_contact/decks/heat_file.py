@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-from fenics_contact._scene_file.heat import HeatFile, Timed
+from fenics_contact._scene_file.heat import HeatFile
 from fenics_contact.decks.heat import HeatDeck
 from fenics_contact.decks.heat_course import course
 from fenics_contact.errors import together
@@ -42,11 +42,6 @@ class HeatDeckFile(HeatFile):
     steps_in_words = "steps of heat"
 
     @property
-    def name(self) -> str:
-        """The file's name without suffix."""
-        return Path(self.deck.frame.name).stem
-
-    @property
     def notes(self) -> Sequence[str]:
         """What is done otherwise than the deck says, and known cards without effect."""
         return self.deck.notes
@@ -66,18 +61,20 @@ class HeatDeckFile(HeatFile):
         """The ends of its steps that conduct heat."""
         return tuple(cards.start + cards.period for cards, _ in self.deck.steps)
 
-    def followed(self, show: Callable[[str], None]) -> Iterator[Timed]:
+    def followed(self, show: Callable[[str], None]) -> Iterator[tuple[float, Any, list[HeatState]]]:
         """Yield times with their states, once the tables of the deck are written. Collective."""
-        printed = dict[int, str]()
-        for at in course(self.deck, self.comm, {"partitions": self.partitions}):
-            text = "".join(each.printout(at.time) for each in at.new)
-            printed[at.step] = printed.get(at.step, "") + text
+        printed = defaultdict[int, str](str)
+        for step, time, found in course(self.deck, self.comm, {"partitions": self.partitions}):
+            printed[step] += "".join(of.printout(state, number, time) for of, state, number in found)
             with together(self.comm):
-                if self.comm.rank == 0 and text:
-                    write_text(self.folder / "prints" / f"step_{at.step + 1}.dat", printed[at.step])
-            known = [T for heat in at.heat for own in heat.temperature.values() for T in own]
-            degrees = f"{min(known):.6g} to {max(known):.6g} degrees, " if known else ""
-            closed = sum(own.progress(state)[-1] for own, state, _ in at.new)
-            show(f"step {at.step + 1}, time {at.time:g}: {degrees}{closed} points closed")
-            states = [each.state for each in at.new]
-            yield at.time, Warm(*states) if len(states) > 1 else states[0], at.heat
+                if self.comm.rank == 0 and printed[step]:
+                    write_text(self.folder / "prints" / f"step_{step + 1}.dat", printed[step])
+            states = [each.state for each in found]
+            heat = [each.state for each in found if each.of.deck is self.deck.frame]
+            ranges = [
+                f", {name} {min(T):.6g} to {max(T):.6g}"
+                for own in heat
+                for name, T in own.temperature.items()
+            ]
+            show(f"step {step + 1}, time {time:g}{''.join(ranges)}")
+            yield time, Warm(*states) if len(states) > 1 else states[0], heat

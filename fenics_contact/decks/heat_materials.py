@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import takewhile
+from typing import Any
 
 import numpy as np
 
 from fenics_contact.decks.materials import MaterialCards, axes_of, depends_on_temperature, row_at, table_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.heat.conductance import Conductance, ConductanceTable
+from fenics_contact.heat.friction import FrictionHeat
 from fenics_contact.heat.properties import Conductor, GivenProperty, TemperatureTable
 from fenics_contact.readers.deck_cards import Card
 
@@ -61,21 +63,39 @@ def _by_temperature(card: Card, width: int, column: int, factor: float = 1.0) ->
     return TemperatureTable(table[:, -1].tolist(), (factor * table[:, column]).tolist())
 
 
-def read_conductances(cards: Sequence[Card]) -> dict[str, Card]:
-    """Return the *GAP CONDUCTANCE of surface interactions by their names."""
-    found, name = dict[str, Card](), ""
+def read_passages(cards: Sequence[Card]) -> dict[str, dict[str, Card]]:
+    """Return what surface interactions say of heat and friction, by their names and those of cards."""
+    found, name = dict[str, dict[str, Card]](), ""
     for card in takewhile(lambda card: card.name != "STEP", cards):
         name = card.required("NAME") if card.name == "SURFACEINTERACTION" else name
-        if card.name == "GAPCONDUCTANCE":
-            found[name] = card
+        if card.name in ("GAPCONDUCTANCE", "GAPHEATGENERATION", "FRICTION"):
+            found.setdefault(name, {})[card.name] = card
     return found
 
 
-def conductance_of(card: Card, reach: float) -> Conductance:
-    """Return how much heat passes where surfaces touch, which is up to a distance, by the pressure.
+def passage_of(laws: Mapping[str, Card], reach: float) -> dict[str, Any]:
+    """Return conductance and heat of friction of surfaces that touch, which is up to a distance."""
+    law, friction = laws.get("GAPCONDUCTANCE"), FrictionHeat(part=0.0)
+    if "GAPHEATGENERATION" in laws:
+        friction = _friction_heat(laws["GAPHEATGENERATION"], laws.get("FRICTION"))
+    nothing = ConductanceTable((), ())
+    return {"conductance": _conductance(law, reach) if law else nothing, "friction": friction}
 
-    Lines are a conductance, a pressure and a temperature, as in CalculiX.
-    """
+
+def _friction_heat(card: Card, friction: Card | None) -> FrictionHeat:
+    """Return the part of friction's work that is heat, the slave's share of it, and any speed."""
+    given = card.floats(0) if card.lines else []
+    part, share, speed = [*given, *(1.0, 0.5, -1.0)[len(given) :]]
+    if friction is None:
+        raise card.error("needs the *FRICTION of its interaction, there is none: add it")
+    try:
+        return FrictionHeat(friction.floats(0)[0] * (speed >= 0.0), max(speed, 0.0), part, share)
+    except InvalidInputError as error:
+        raise card.error(f"{error}; its line has the part, the share and a speed") from error
+
+
+def _conductance(card: Card, reach: float) -> Conductance:
+    """Return what passes by the pressure, in lines of a conductance, a pressure and a temperature."""
     if not card.lines:
         raise card.error("has no data line: add it")
     table = card.table(3)

@@ -22,10 +22,13 @@ def moving(cards: Sequence[Card]) -> list[int]:
     return [k for k, group in enumerate(steps) if procedure_of(group).name != "HEATTRANSFER"]
 
 
-def statics_of(cards: Sequence[Card], found: Mapping[int, Temperatures]) -> Iterator[Card]:
+def statics_of(
+    cards: Sequence[Card], found: Mapping[int, Temperatures], times: Mapping[int, Sequence[float]]
+) -> Iterator[Card]:
     """Yield the cards of mechanics; steps have the temperatures of the last step that has found some.
 
-    `found`: temperatures at the ends of steps by their numbers, from 0.
+    `found`: temperatures at the ends of steps by their numbers, from 0; `times`: at which increments of steps
+    that have some end, since their start.
     """
     steps, number = set(moving(cards)), -1
     for card in cards:
@@ -41,7 +44,9 @@ def statics_of(cards: Sequence[Card], found: Mapping[int, Temperatures]) -> Iter
                 )
         elif card.name in HEAT or card.name == "STATIC":
             known = {name: card.parameters[name] for name in PARAMETERS["STATIC"] & set(card.parameters)}
-            yield replace(card, name="STATIC", written="STATIC", parameters=known)
+            static = replace(card, name="STATIC", written="STATIC", parameters=known)
+            ends = [repr(time) for time in times.get(number, ())]
+            yield _with(static, [*(card.lines[:1] or ["1., 1."]), *ends]) if ends else static
             last = [k for k in found if k <= number]
             if last:
                 yield _given(card, *found[max(last)])
@@ -49,9 +54,11 @@ def statics_of(cards: Sequence[Card], found: Mapping[int, Temperatures]) -> Iter
             yield card
 
 
-def warmer(cards: Sequence[Card], numbers: np.ndarray, values: np.ndarray) -> Iterator[Card]:
+def warmer(
+    cards: Sequence[Card], numbers: np.ndarray, values: np.ndarray, times: Mapping[int, Sequence[float]]
+) -> Iterator[Card]:
     """Yield the cards of mechanics with one more step of other temperatures: bodies will be heated."""
-    found = [*statics_of(cards, {})]
+    found = [*statics_of(cards, {}, times)]
     yield from found
     head, static, end = (
         [card for card in found if card.name == name][-1] for name in ("STEP", "STATIC", "ENDSTEP")
@@ -63,7 +70,8 @@ def warmer(cards: Sequence[Card], numbers: np.ndarray, values: np.ndarray) -> It
 def _given(card: Card, numbers: np.ndarray, values: np.ndarray) -> Card:
     """Return the card that gives nodes their temperatures, at the place of another one."""
     lines = [f"{number}, {value!r}" for number, value in zip(numbers.tolist(), values.tolist(), strict=True)]
-    where = [card.line] * len(lines)
-    return replace(
-        card, name="TEMPERATURE", written="TEMPERATURE", parameters={}, lines=lines, numbers=where, files=()
-    )
+    return _with(replace(card, name="TEMPERATURE", written="TEMPERATURE", parameters={}), lines)
+
+
+def _with(card: Card, lines: list[str]) -> Card:
+    return replace(card, lines=lines, numbers=[card.line] * len(lines), files=())

@@ -80,8 +80,9 @@ class HeatCards:
     """A step of heat as the deck has it.
 
     `number`: that of the step in the deck, from 0; `card`: its procedure; `steady`: whether nothing is
-    stored; `start` and `period`: total time before it and its own; `first`: length of its first increment;
-    `direct`: whether all have this length; `ramped`: whether what has no amplitude grows from zero.
+    stored; `start` and `period`: total time before it and its own; `first` and `most`: length of its first
+    and its longest increment; `direct`: whether all have this length; `ramped`: whether what has no amplitude
+    grows from zero.
     """
 
     number: int
@@ -90,6 +91,7 @@ class HeatCards:
     start: float
     period: float
     first: float
+    most: float
     direct: bool
     ramped: bool
     acting: Sequence[Acting]
@@ -100,6 +102,17 @@ class HeatCards:
         """Times since it began at which amplitudes turn, and its end."""
         times = self.amplitudes.times(np.array([each.by for each in self.acting], dtype=int), self.start)
         return sorted({t for t in times if 1e-9 < t / self.period < 1.0 - 1e-9} | {self.period})
+
+    @property
+    def ends(self) -> list[float]:
+        """Ends of increments: each is half as long again as the one before, up to the longest."""
+        time = length = np.inf if self.steady else self.first
+        found = self.turns
+        while time < self.period * (1.0 - 1e-9):
+            found.append(time)
+            length = min(1.5 * length, self.most)
+            time += length
+        return sorted(set(found))
 
     def factors(self, time: float) -> np.ndarray:
         """Return the factors of amplitudes by their numbers at a time since the step began."""
@@ -125,15 +138,15 @@ def heat_steps(cards: Sequence[Card], mesh: DeckMesh) -> list[HeatCards]:
         if head.name != "STEP":
             continue
         number, card = number + 1, procedure_of([head, *rest])
-        numbers = [*(card.floats(0) if card.lines else []), 0.0, 0.0]
+        numbers = [*(card.floats(0) if card.lines else []), *[0.0] * 4]
         first, period = (each if each > 0.0 else 1.0 for each in numbers[:2])
         if card.name in HEAT:
             steady = "STEADYSTATE" in card.parameters
             direct = plain(card.parameters.get("DIRECT", "NO")) != "NO"
             ramped = head.name_of("AMPLITUDE") == "RAMP" and not steady
             acting = _last(acting)
-            made = HeatCards(number, card, steady, start, period, first, direct, ramped, acting, amplitudes)
-            found.append(made)
+            length = first, first if direct else numbers[3] or period, direct
+            found.append(HeatCards(number, card, steady, start, period, *length, ramped, acting, amplitudes))
         start += period
     return found
 

@@ -159,9 +159,9 @@ def _of_statics(results: DeckResults, comm: MPI.Comm, settings: dict[str, Any]) 
 def _of_heat(deck: HeatDeck, comm: MPI.Comm, settings: dict[str, Any]) -> Solved:
     """Yield temperatures, and what they do to bodies, of all increments as they are solved. Collective."""
     solved = list[Increment]()
-    for moment in course(deck, comm, settings):
-        solved.append(_increment(moment.step, moment.time, moment.new, solved))
-        yield moment.new, solved[-1]
+    for step, time, new in course(deck, comm, settings):
+        solved.append(_increment(step, time, new, solved))
+        yield new, solved[-1]
 
 
 def _solve(
@@ -187,7 +187,7 @@ def _solve(
                 failures.append(error)
                 break
             solved.append(last)
-            printed += [each.printout(last.time) for each in new]
+            printed += [own.printout(state, step, last.time) for own, state, step in new]
             fields = [field for own, state, step in new for field in own.nodal(state, step)]
             add_on_first(comm, writer, fields, last.time, last.step, last.number)
             _write_lines(comm, files, solved)

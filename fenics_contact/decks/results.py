@@ -187,10 +187,6 @@ class Computed(NamedTuple):
     state: Any
     step: int
 
-    def printout(self, time: float) -> str:
-        """Return its tables of the printed file. Collective."""
-        return self.of.printout(self.state, self.step, time)
-
 
 def has_type(block: Block) -> bool:
     """Return whether elements are among the types of cells that files have."""

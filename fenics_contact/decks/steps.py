@@ -414,9 +414,11 @@ def _step(
 ) -> Step:
     """Return a step that begins at a time."""
     head = group[0]
-    numbers = next(card.floats(0) if card.lines else [] for card in group if card.name == "STATIC")
+    static = next(card for card in group if card.name == "STATIC")
+    numbers = static.floats(0) if static.lines else []
     period = numbers[1] if len(numbers) > 1 and numbers[1] > 0 else 1.0
     times = amplitudes.times(state.amplitudes, start)
+    times |= {time for row in range(1, len(static.lines)) for time in static.floats(row)}
     inner = sorted(t for t in times if 1e-9 * period < t < period * (1 - 1e-9))
     at_once = head.name_of("AMPLITUDE") == "STEP"
     instants = [

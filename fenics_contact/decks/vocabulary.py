@@ -99,7 +99,7 @@ HEAT_MODEL = MESH_CARDS | {
     "DENSITY",
 }  # fmt: skip
 #: Cards that are of heat alone.
-HEAT_ALONE = {"DFLUX", "FILM", "RADIATE", "CFLUX", "GAPCONDUCTANCE"}
+HEAT_ALONE = {"DFLUX", "FILM", "RADIATE", "CFLUX", "GAPCONDUCTANCE", "GAPHEATGENERATION"}
 #: Known cards that have no effect on mechanics, but on heat.
 HEAT_ONLY = {"CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS"}
 #: Cards of steps that conduct heat, and of what they have.
@@ -159,6 +159,7 @@ PARAMETERS: dict[str, set[str]] = {
     "CONDUCTIVITY": {"TYPE"},
     "SPECIFICHEAT": set(),
     "GAPCONDUCTANCE": {"PRESSURE"},
+    "GAPHEATGENERATION": set(),
     "PHYSICALCONSTANTS": {"ABSOLUTEZERO", "STEFANBOLTZMANN"},
     **{name: {"OP", "AMPLITUDE", "TIMEDELAY"} for name in ("CFLUX", "DFLUX", "FILM", "RADIATE")},
 }
@@ -178,7 +179,6 @@ STRUCTURES = {
         name: "heat is conducted in decks with *HEAT TRANSFER: give temperatures by *TEMPERATURE"
         for name in sorted(HEAT_ALONE)
     },
-    "GAPHEATGENERATION": "heat of friction is not read: give it by FrictionHeat in Python",
 }
 
 
