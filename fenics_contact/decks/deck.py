@@ -24,7 +24,7 @@ from fenics_contact.decks.shells import ShellPrints, on_solids
 from fenics_contact.decks.spring_ends import springs_of
 from fenics_contact.decks.supports import SupportBuilder
 from fenics_contact.decks.tables import Print, PrintTable
-from fenics_contact.decks.vocabulary import PROCEDURES, refuse_unknown
+from fenics_contact.decks.vocabulary import HEAT, PROCEDURES, refuse_unknown
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.readers.deck_assembly import read_cards
@@ -246,6 +246,11 @@ def read_deck(path: str | Path, comm: MPI.Comm | None = None, *, statics_only: b
     """
     chosen = _leading_statics if statics_only else _all
     return on_root_then_bcast(comm, lambda: _read(Path(path), chosen))
+
+
+def conducts(path: Path) -> bool:
+    """Return whether a step of a deck conducts heat."""
+    return path.is_file() and any(card.name in HEAT for card in read_cards(path))
 
 
 #: Splits cards into those that are read and those that are left out.

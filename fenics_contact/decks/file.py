@@ -13,9 +13,8 @@ from fenics_contact._scene_file.bodies import Shaped
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import SceneFileError, Source
 from fenics_contact._scene_file.validation import validated, wrong_names
-from fenics_contact.decks.deck import Deck, read_deck
+from fenics_contact.decks.deck import Deck, conducts, read_deck
 from fenics_contact.decks.tables import write_tables
-from fenics_contact.decks.vocabulary import conducts
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.ranks import on_root_then_bcast
 
@@ -78,16 +77,15 @@ def read_deck_file(
                 f"--set changes solver, accuracy, output, units and title of a deck, got {override!r}: "
                 "make a scene file of it with `fenics-contact convert`"
             )
-    made: Callable[..., SceneFile] = DeckFile
-    reader: Callable[..., object] = read
-    form, data = DeckFile.documents(), _NOTHING
+    made: tuple[Any, ...] = DeckFile, _NOTHING, read
     if read is read_deck and on_root_then_bcast(comm, lambda: conducts(path)):
         from fenics_contact.decks.heat import read_heat_deck
         from fenics_contact.decks.heat_file import NOTHING, HeatDeckFile
 
-        made, form, data, reader = HeatDeckFile, HeatDeckFile.documents(), NOTHING, read_heat_deck
+        made = HeatDeckFile, NOTHING, read_heat_deck
+    kind, data, reader = made
     source = Source(path.name, path.parent, data, "\n").with_overrides(overrides)
-    document = validated(source, form)
+    document = validated(source, kind.documents())
     if wrong := wrong_names(source, document):
         raise SceneFileError(source.name, wrong)
-    return made(source, document, comm, reader(path, comm))
+    return kind(source, document, comm, reader(path, comm))  # type: ignore[no-any-return]

@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any
 
 from fenics_contact._scene_file.heat import HeatFile
+from fenics_contact.decks.course import of_heat
 from fenics_contact.decks.heat import HeatDeck
-from fenics_contact.decks.heat_course import course
 from fenics_contact.errors import together
 from fenics_contact.heat.fields import BothOnBodies
 from fenics_contact.heat.scene import HeatScene
@@ -64,7 +64,7 @@ class HeatDeckFile(HeatFile):
     def followed(self, show: Callable[[str], None]) -> Iterator[tuple[float, Any, list[HeatState]]]:
         """Yield times with their states, once the tables of the deck are written. Collective."""
         printed = defaultdict[int, str](str)
-        for step, time, found in course(self.deck, self.comm, {"partitions": self.partitions}):
+        for step, time, found in of_heat(self.deck, self.comm, {"partitions": self.partitions}):
             printed[step] += "".join(of.printout(state, number, time) for of, state, number in found)
             with together(self.comm):
                 if self.comm.rank == 0 and printed[step]:

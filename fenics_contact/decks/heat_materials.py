@@ -89,7 +89,7 @@ def _friction_heat(card: Card, friction: Card | None) -> FrictionHeat:
     if friction is None:
         raise card.error("needs the *FRICTION of its interaction, there is none: add it")
     try:
-        return FrictionHeat(friction.floats(0)[0] * (speed >= 0.0), max(speed, 0.0), part, share)
+        return FrictionHeat(friction.floats(0)[0], max(speed, 0.0), part, share)
     except InvalidInputError as error:
         raise card.error(f"{error}; its line has the part, the share and a speed") from error
 

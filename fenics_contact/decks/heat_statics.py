@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact.decks.heat_steps import procedure_of
 from fenics_contact.decks.steps import groups_of
-from fenics_contact.decks.vocabulary import HEAT, HEAT_ALONE, HEAT_ONLY, PARAMETERS
+from fenics_contact.decks.vocabulary import HEAT, HEAT_ALONE, PARAMETERS
 from fenics_contact.readers.deck_cards import Card
 
 #: Numbers of nodes and their temperatures.
@@ -50,7 +50,7 @@ def statics_of(
             last = [k for k in found if k <= number]
             if last:
                 yield _given(card, *found[max(last)])
-        elif card.name not in HEAT_ALONE | HEAT_ONLY:
+        elif card.name not in HEAT_ALONE | {"CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS"}:
             yield card
 
 

@@ -6,16 +6,14 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.files import hidden_folder
-from fenics_contact._equilibrium.steps import LoadSequence
-from fenics_contact.decks.deck import read_deck
-from fenics_contact.decks.heat import HeatDeck, read_heat_deck
-from fenics_contact.decks.heat_course import course, results_of
+from fenics_contact.decks.course import Moment, of_heat, of_statics, results_of
+from fenics_contact.decks.deck import conducts, read_deck
+from fenics_contact.decks.heat import read_heat_deck
 from fenics_contact.decks.results import Computed, DeckResults, exponential
-from fenics_contact.decks.vocabulary import conducts
 from fenics_contact.errors import together
 from fenics_contact.errors.ranks import on_root_then_bcast
 from fenics_contact.output.files import OutputError, write_text
@@ -113,14 +111,13 @@ def run_job(
             _clear(given, list(files.values()))
     if on_root_then_bcast(comm, lambda: conducts(given)):
         heat = read_heat_deck(given, comm)
-        known, notes = results_of(heat), heat.notes
-        increments = _of_heat(heat, comm, settings)
+        known, notes, moments = results_of(heat), heat.notes, of_heat(heat, comm, settings)
     else:
         known = [DeckResults(read_deck(given, comm))]
-        notes, increments = known[0].deck.notes, _of_statics(known[0], comm, settings)
+        notes, moments = known[0].deck.notes, of_statics(known[0], comm, settings)
     for words in dict.fromkeys([*notes, *(each for results in known for each in results.notes)]):
         note(words)
-    _solve(increments, known[0], comm, files, watch)
+    _solve(moments, known[0], comm, files, watch)
     return list(files.values())
 
 
@@ -139,33 +136,8 @@ def _clear(deck: Path, files: list[Path]) -> None:
         ) from error
 
 
-#: What was computed in an increment, and the increment.
-Solved: TypeAlias = Iterator[tuple[Sequence[Computed], Increment]]
-
-
-def _of_statics(results: DeckResults, comm: MPI.Comm, settings: dict[str, Any]) -> Solved:
-    """Yield the states of all increments as they are solved. Collective."""
-    deck, solved = results.deck, list[Increment]()
-    sequence = LoadSequence(deck.problem(comm, **settings), count=len(deck.steps))
-    for step, load in zip(deck.step_of, deck.steps, strict=True):
-        state = sequence.advance(load)
-        time = float(len(solved) + 1) if load.time is None else float(load.time)
-        new = [Computed(results, state, step)]
-        solved.append(_increment(step, time, new, solved))
-        yield new, solved[-1]
-    sequence.finish()
-
-
-def _of_heat(deck: HeatDeck, comm: MPI.Comm, settings: dict[str, Any]) -> Solved:
-    """Yield temperatures, and what they do to bodies, of all increments as they are solved. Collective."""
-    solved = list[Increment]()
-    for step, time, new in course(deck, comm, settings):
-        solved.append(_increment(step, time, new, solved))
-        yield new, solved[-1]
-
-
 def _solve(
-    increments: Solved,
+    moments: Iterator[Moment],
     results: DeckResults,
     comm: MPI.Comm,
     files: dict[str, Path],
@@ -178,7 +150,7 @@ def _solve(
         writer = stack.enter_context(writing(comm, files[".frd"], results.written, materials))
         while True:
             try:
-                new, last = next(increments)
+                step, time, new = next(moments)
             except StopIteration:
                 break
             except Exception as error:
@@ -186,7 +158,7 @@ def _solve(
                     raise
                 failures.append(error)
                 break
-            solved.append(last)
+            solved.append(last := _increment(step, time, new, solved))
             printed += [own.printout(state, step, last.time) for own, state, step in new]
             fields = [field for own, state, step in new for field in own.nodal(state, step)]
             add_on_first(comm, writer, fields, last.time, last.step, last.number)

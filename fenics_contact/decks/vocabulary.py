@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence, Set
-from pathlib import Path
 
-from fenics_contact.readers.deck_assembly import read_cards
 from fenics_contact.readers.deck_cards import Card, DeckError
 from fenics_contact.readers.deck_elements import element_of
 from fenics_contact.readers.deck_links import is_of_links
@@ -100,8 +98,6 @@ HEAT_MODEL = MESH_CARDS | {
 }  # fmt: skip
 #: Cards that are of heat alone.
 HEAT_ALONE = {"DFLUX", "FILM", "RADIATE", "CFLUX", "GAPCONDUCTANCE", "GAPHEATGENERATION"}
-#: Known cards that have no effect on mechanics, but on heat.
-HEAT_ONLY = {"CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS"}
 #: Cards of steps that conduct heat, and of what they have.
 HEAT_CARDS = HEAT | HEAT_ALONE | {"HEADING", "STEP", "ENDSTEP", "BOUNDARY", "AMPLITUDE", "PHYSICALCONSTANTS"}
 #: Parameters of the cards that are read; any other one is refused.
@@ -154,7 +150,7 @@ PARAMETERS: dict[str, set[str]] = {
     "CLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
     "DLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY"},
     "DSLOAD": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "CONSTANTRESULTANT", "FOLLOWER"},
-    "TEMPERATURE": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "LINTEMP"},
+    "TEMPERATURE": {"OP", "NAME", "AMPLITUDE", "TIMEDELAY", "LINTEMP", "FILE", "BSTEP"},
     **{name: {"STEADYSTATE", "DIRECT", "SOLVER", "DELTMX", "TIMERESET", "END", "MXDEM"} for name in HEAT},
     "CONDUCTIVITY": {"TYPE"},
     "SPECIFICHEAT": set(),
@@ -174,17 +170,13 @@ STRUCTURES = {
     "USERMATERIAL": "materials of user routines are not read: take one of the guide, or write it in Python",
     "DEPVAR": "it belongs to materials of user routines, which are not read",
     "SUBMODEL": "submodels are not read: give displacements by *BOUNDARY",
+    "VIEWFACTOR": "cavities, whose surfaces see each other, are not solved: give temperatures around (R1)",
     "CREEP": "creep is not solved here: it goes on in time",
     **{
         name: "heat is conducted in decks with *HEAT TRANSFER: give temperatures by *TEMPERATURE"
         for name in sorted(HEAT_ALONE)
     },
 }
-
-
-def conducts(path: Path) -> bool:
-    """Return whether a step of a deck conducts heat."""
-    return path.is_file() and any(card.name in HEAT for card in read_cards(path))
 
 
 def refuse_unknown(cards: Sequence[Card], known: Set[str] = KNOWN | PROCEDURES) -> None:

@@ -323,7 +323,7 @@ def cards_of(path: Path) -> list[Card]:
             parts[-1].append(stretch)
         elif stretch.lines and any(line.partition(",")[0].strip().isdecimal() for line in stretch.lines):
             raise stretch.error(f"data must follow a card, got {stretch.lines[0].strip()[:40]!r}")
-    return [_card(stretches) for stretches in parts]
+    return [_with_temperatures(_card(stretches), path.parent) for stretches in parts]
 
 
 def _stretches(path: Path, folder: Path, inside: tuple[Path, ...]) -> Iterator[_Stretch]:
@@ -406,6 +406,13 @@ def _card(stretches: Sequence[_Stretch]) -> Card:
     )
 
 
+def _require(card: Card, path: Path, what: str) -> None:
+    try:
+        require_file(path, what)
+    except InvalidInputError as error:
+        raise card.error(str(error)) from error
+
+
 def _included(card: Card, folder: Path, inside: tuple[Path, ...]) -> Iterator[_Stretch]:
     given = card.parameters.get("INPUT", "").strip().strip('"')
     if not given:
@@ -413,8 +420,27 @@ def _included(card: Card, folder: Path, inside: tuple[Path, ...]) -> Iterator[_S
     path = folder / given
     if len(inside) > DEEPEST or path in inside:
         raise card.error(f"file {given!r} includes itself: leave one of the two out")
-    try:
-        require_file(path, "an included file")
-    except InvalidInputError as error:
-        raise card.error(str(error)) from error
+    _require(card, path, "an included file")
     yield from _stretches(path, folder, inside)
+
+
+def _with_temperatures(card: Card, folder: Path) -> Card:
+    """Return a card with the temperatures at the end of a step in a file of results, if it names one."""
+    if card.name != "TEMPERATURE" or not {"FILE", "BSTEP"} & set(card.parameters):
+        return card
+    given, step = card.parameters.get("FILE", "").strip('"'), card.number_of("BSTEP", 1.0)
+    now, rows, wanted = "", list[str](), False
+    _require(card, folder / given, "a file of temperatures")
+    for line in (folder / given).read_text("utf-8", errors="replace").splitlines():
+        if line[4:10] == "1PSTEP":
+            now = line[48:60].strip()
+        elif line[:3] == " -4":
+            wanted = now == f"{step:.0f}" and line[5:11] == "NDTEMP"
+            rows = [] if wanted else rows
+        elif wanted and line[:3] == " -1":
+            rows.append(f"{line[3:13]}, {line[13:25]}")
+    if card.lines or not rows:
+        raise card.error(
+            f"needs NT of step {step:g} in {given!r}, and no lines: write it there by *NODE FILE"
+        )
+    return replace(card, lines=rows, numbers=[card.line] * len(rows), files=())

@@ -9,8 +9,9 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import _cli as cli
+from fenics_contact.decks import DeckError, read_deck, read_heat_deck, run_job
 from fenics_contact.output import read_result
-from tests.decks.hot_bars import BAR, CLAMPED, COLD, EXPANDS, WARM, steady
+from tests.decks.hot_bars import ALL, BAR, CLAMPED, COLD, EXPANDS, START, WARM, steady
 from tests.decks.texts import deck
 
 ASKED = "*NODE PRINT, NSET=BAR_X1, TOTALS=YES\nNT, RFL, U\n*EL PRINT, ELSET=BAR\nHFL\n*END STEP\n"
@@ -98,3 +99,68 @@ def test_runs_that_are_not_solved_are_refused_before_heat_is(
     printed = capsys.readouterr()
     assert words in printed.err
     assert printed.out == ""
+
+
+def test_a_static_step_has_the_temperatures_of_an_earlier_job(tmp_path: Path) -> None:
+    asked = "*NODE FILE\nNT\n*END STEP\n"
+    hotter = steady("*BOUNDARY\nBAR_X1, 11, 11, 100.\n").replace("*END STEP\n", asked)
+    run_job(deck(tmp_path, EXPANDS + steady(WARM) + hotter, "warm.inp"), MPI.COMM_SELF)
+    steps = (
+        f"*STEP\n*STATIC\n{CLAMPED}*TEMPERATURE, FILE=warm.frd, BSTEP=2\n*END STEP\n"
+        '*STEP\n*STATIC\n*TEMPERATURE, FILE="warm.frd"\n*END STEP\n'
+    )
+    found = read_deck(deck(tmp_path, EXPANDS + steps))
+    end = found.scene.bodies["BAR"].mesh.points[:, 0] > 4.0 - 1e-9
+    moved = [state.gather_displacement("BAR")[end, 0].mean() for state in found.solve(MPI.COMM_SELF)]
+    assert moved == pytest.approx([4.0 * 1e-5 * 40.0, 4.0 * 1e-5 * 20.0], rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("card", "words"),
+    [
+        ("*TEMPERATURE, FILE=cold.frd\n", "there must be a file of temperatures .*cold.frd"),
+        ("*TEMPERATURE, BSTEP=2\n", "a file of temperatures"),
+        (
+            "*TEMPERATURE, FILE=warm.frd, BSTEP=2\n",
+            "needs NT of step 2 in 'warm.frd', and no lines: write it",
+        ),
+        ("*TEMPERATURE, FILE=warm.frd\n1, 5.\n", "needs NT of step 1 in 'warm.frd', and no lines"),
+    ],
+)
+def test_files_without_the_temperatures_of_a_step_are_refused(tmp_path: Path, card: str, words: str) -> None:
+    run_job(deck(tmp_path, EXPANDS + steady(WARM), "warm.inp"), MPI.COMM_SELF)
+    with pytest.raises(DeckError, match=words):
+        read_deck(deck(tmp_path, EXPANDS + f"*STEP\n*STATIC\n{CLAMPED}{card}*END STEP\n"))
+
+
+@pytest.mark.parametrize(
+    ("card", "words"),
+    [
+        ("*FILM, FILM AMPLITUDE=A\n4, F4, 1., 1.\n", r"\*FILM: the parameter FILMAMPLITUDE is not read"),
+        ("*RADIATE, CAVITY=A\n4, R4, 1., 1.\n", r"\*RADIATE: the parameter CAVITY is not read"),
+        ("*RADIATE\n4, R4CR, 1., 1.\n", "radiation between the surfaces of a cavity is not solved"),
+        ("*VIEWFACTOR, READ\n", r"\*VIEWFACTOR: cavities, whose surfaces see each other, are not solved"),
+    ],
+)
+def test_what_is_asked_for_and_not_done_is_refused_by_name(tmp_path: Path, card: str, words: str) -> None:
+    with pytest.raises(DeckError, match=words):
+        read_heat_deck(deck(tmp_path, BAR + steady(COLD + card)))
+
+
+def test_fluxes_sources_and_surroundings_follow_amplitudes(tmp_path: Path) -> None:
+    grows = ALL + START + "*AMPLITUDE, NAME=GROWS\n0., 0., 4., 1.\n"
+    cards = (
+        "*CFLUX, AMPLITUDE=GROWS\nBAR_X1, 11, 0.1\n*DFLUX, AMPLITUDE=GROWS\n4, S4, 0.4\nBAR, BF, 0.2\n"
+        "*FILM, AMPLITUDE=GROWS\n1, F6, 80., 0.1\n"
+    )
+    text = BAR + grows + f"*STEP\n*HEAT TRANSFER, DIRECT\n1., 2.\n{cards}*END STEP\n"
+    states = [state for _, _, state in read_heat_deck(deck(tmp_path, text)).increments(MPI.COMM_SELF)]
+    parts = states[-1].balance.by_part
+    found = {name.split()[0]: value for name, value in parts.items()}
+    assert found["HeatAtNodes"] == pytest.approx(0.5 * 4 * 0.1)
+    assert found["HeatFlux"] == pytest.approx(0.5 * 0.4)
+    assert found["HeatSource"] == pytest.approx(0.5 * 4.0 * 0.2)
+    cold = states[-1].temperature["BAR"][:1].min()
+    assert found["Convection"] == pytest.approx(
+        0.1 * (0.5 * 80.0 - cold), abs=0.1 * np.ptp(states[-1].values)
+    )

@@ -1,8 +1,9 @@
-"""What a deck that conducts heat goes through: its temperatures, and bodies that move at them, by times."""
+"""What a deck goes through: temperatures, and bodies that move, at the ends of increments."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from fenics_contact._equilibrium.steps import LoadSequence
@@ -18,6 +19,16 @@ if TYPE_CHECKING:
 Moment: TypeAlias = tuple[int, float, list[Computed]]
 
 
+def of_statics(results: DeckResults, comm: MPI.Comm, settings: Mapping[str, Any]) -> Iterator[Moment]:
+    """Yield what a deck of statics goes through; settings are those of `ContactProblem`. Collective."""
+    deck = results.deck
+    sequence = LoadSequence(deck.problem(comm, **settings), count=len(deck.steps))
+    for number, (step, load) in enumerate(zip(deck.step_of, deck.steps, strict=True), start=1):
+        time = float(number if load.time is None else load.time)
+        yield step, time, [Computed(results, sequence.advance(load), step)]
+    sequence.finish()
+
+
 def results_of(deck: HeatDeck) -> list[DeckResults]:
     """Return the results of what a deck conducts, and of its bodies that move, if they do."""
     kinds = (HeatResults, DeckResults)
@@ -26,11 +37,8 @@ def results_of(deck: HeatDeck) -> list[DeckResults]:
     return [HeatResults(deck.frame, moved * len(moving)), *moving]
 
 
-def course(deck: HeatDeck, comm: MPI.Comm, settings: Mapping[str, Any]) -> Iterator[Moment]:
-    """Yield what a deck goes through, in the order of time. Collective.
-
-    `settings`: those of `ContactProblem` for steps in which bodies move.
-    """
+def of_heat(deck: HeatDeck, comm: MPI.Comm, settings: Mapping[str, Any]) -> Iterator[Moment]:
+    """Yield what a deck that conducts heat goes through, in the order of time. Collective."""
     results, *moving = results_of(deck)
     ends, waiting = dict[int, HeatState](), list[Moment]()
     state: Any
@@ -46,17 +54,14 @@ def course(deck: HeatDeck, comm: MPI.Comm, settings: Mapping[str, Any]) -> Itera
             waiting.append((number, time, [Computed(results, state, number)]))
         if not moving:
             yield waiting.pop()
-    for moved in () if deck.acts_back else moving:
-        statics = deck.statics(list(ends.values()))
-        sequence = LoadSequence(statics.problem(comm, **settings), count=len(statics.steps))
-        for place, load in zip(statics.step_of, statics.steps, strict=True):
+    alone = [cards for cards, _ in deck.steps if cards.number not in deck.moving]
+    for each in () if deck.acts_back else moving:
+        moved = replace(each, deck=deck.statics(list(ends.values())))
+        for place, at, found in of_statics(moved, comm, settings):
             number = deck.moving[place]
-            alone = [cards for cards, _ in deck.steps if cards.number not in deck.moving]
-            time = float(load.time or 0.0) + sum(cards.period for cards in alone if cards.number < number)
+            time = at + sum(cards.period for cards in alone if cards.number < number)
             while waiting and waiting[0][1] < time:
                 yield waiting.pop(0)
-            state = sequence.advance(load)
             warm = [Computed(results, own, number) for k, own in ends.items() if k <= number]
-            yield number, time, [*warm[-1:], Computed(moved, state, place)]
-        sequence.finish()
+            yield number, time, [*warm[-1:], *found]
     yield from waiting
