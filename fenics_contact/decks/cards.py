@@ -145,9 +145,13 @@ class DeckCards:
         for card in self.cards:
             if card.name in WITHOUT_EFFECT and card.name != "HEADING":
                 self.note(card, f"has no effect here ({WITHOUT_EFFECT[card.name]})")
-            for name in card.parameters:
-                if (card.name, name) in IDLE_PARAMETERS:
-                    self.note(card, f"{name} {IDLE_PARAMETERS[card.name, name]}")
+            self.note_idle(card)
+
+    def note_idle(self, card: Card) -> None:
+        """Report parameters of a card without effect."""
+        for name in card.parameters:
+            if (card.name, name) in IDLE_PARAMETERS:
+                self.note(card, f"{name} {IDLE_PARAMETERS[card.name, name]}")
 
     def cut_where_loaded(self, steps: DeckSteps) -> DeckCards:
         """Return the cards with sections cut where loads on volumes act on a part of them."""

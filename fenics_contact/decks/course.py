@@ -41,13 +41,12 @@ def of_heat(deck: HeatDeck, comm: MPI.Comm, settings: Mapping[str, Any]) -> Iter
     """Yield what a deck that conducts heat goes through, in the order of time. Collective."""
     results, *moving = results_of(deck)
     ends, waiting = dict[int, HeatState](), list[Moment]()
-    state: Any
     for place, at, state in deck.increments(comm, partitions=settings.get("partitions")):
         cards = deck.steps[place][0]
         number, time = cards.number, cards.start + at
         if deck.acts_back:
-            both = (results, state.heat), (moving[0], state.mechanics)
-            yield number, time, [Computed(*each, number) for each in both]
+            warm = Computed(results, state.heat, number)
+            yield number, time, [warm, Computed(moving[0], state.mechanics, number)]
             continue
         ends[number] = state
         if number not in deck.moving or at < cards.period:  # else bodies are still to be moved
@@ -62,6 +61,6 @@ def of_heat(deck: HeatDeck, comm: MPI.Comm, settings: Mapping[str, Any]) -> Iter
             time = at + sum(cards.period for cards in alone if cards.number < number)
             while waiting and waiting[0][1] < time:
                 yield waiting.pop(0)
-            warm = [Computed(results, own, number) for k, own in ends.items() if k <= number]
-            yield number, time, [*warm[-1:], *found]
+            known = [Computed(results, own, number) for k, own in ends.items() if k <= number]
+            yield number, time, [*known[-1:], *found]
     yield from waiting

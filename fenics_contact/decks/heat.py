@@ -101,8 +101,7 @@ class HeatDeck:
 
         Args:
             comm: Communicator.
-            error: This part.
-            **cut: ``partitions``, as for `solve_heat`.
+            error: This part; ``partitions`` are as for `solve_heat`.
         """
         if self.acts_back:
             every = [each for each, _ in self.steps]
@@ -114,11 +113,9 @@ class HeatDeck:
                 state = solve_heat(self.scene(number), comm, **cut)
                 yield number, cards.period, state
                 continue
-            given = [
-                *self.scene(number).levels,
-                *(T for own in self.initial.values() for T in (own.min(), own.max())),
-            ]
-            how: Any = {"tolerance": error * (float(np.ptp(given)) or 1.0)}
+            start = [T for own in self.initial.values() for T in (own.min(), own.max())]
+            known = float(np.ptp([*self.scene(number).levels, *start])) or 1.0
+            how: Any = {"tolerance": error * known}
             if cards.direct:
                 how = {"step": cards.first, "scheme": "euler"}
             history = heat_in_time(
@@ -141,8 +138,7 @@ class HeatDeck:
         """
         if not self.moving or self.acts_back:
             raise InvalidInputError(
-                f"the deck {self.frame.name} has no step in which bodies move at temperatures known before: "
-                "add *STATIC; where contact acts on heat states have both"
+                f"{self.frame.name} has no step in which bodies move at known temperatures: add *STATIC"
             )
         found = {
             cards.number: self._by_number(state.temperature)
@@ -177,10 +173,10 @@ class HeatDeck:
 
 @naming_arguments
 def read_heat_deck(path: str | Path, comm: MPI.Comm | None = None) -> HeatDeck:
-    """Read a deck whose steps are all ``*HEAT TRANSFER``.
+    """Read a deck with steps that conduct heat, alone, coupled with mechanics, or before ``*STATIC``.
 
     Elements of heat (DC3D8, ...) and of mechanics (C3D8, ...) conduct alike, integrated in full. What holds
-    and loads bodies mechanically is left out, which the notes say.
+    and loads bodies mechanically is left out where they do not move, which the notes say.
 
     Args:
         path: The file, mostly ``.inp``.
@@ -211,6 +207,7 @@ def _read(path: Path) -> HeatDeck:
     for card in cards:
         if not moves and card.name not in HEAT_MODEL | HEAT_CARDS | PRINT_CARDS:
             deck.note(card, "has no effect on heat")
+        deck.note_idle(card)
         if card.name == "EQUATION" and any(len(row) > 1 and row[1] == "11" for row in card.rows):
             raise card.error("equations of temperatures are not solved: join bodies by *TIE")
     steps = heat_steps(cards, deck.mesh)
@@ -224,10 +221,7 @@ def _read(path: Path) -> HeatDeck:
     _ = made.notes  # refuses mechanics before anything is solved
     for card in cards if made.acts_back else ():
         if card.name in ("HEATTRANSFER", "STATIC", "MODELCHANGE", "CHANGEFRICTION"):
-            raise card.error(
-                "does not go with contact that acts on heat: give *COUPLED TEMPERATURE-DISPLACEMENT in all "
-                "steps, with the same pairs and friction"
-            )
+            raise card.error("does not go with contact that acts on heat: give coupled steps, and all pairs")
     return made
 
 

@@ -30,10 +30,7 @@ def both_ways(
     comm: MPI.Comm,
     **cut: Any,
 ) -> Iterator[tuple[int, float, HeatedState]]:
-    """Yield step, time since it began and state of all increments. Collective.
-
-    `mechanics`: at no temperatures, with as many steps; `heat`: scene of a step at a time since it began.
-    """
+    """Yield step, time since it began and state; `heat`: scene of a step at such a time. Collective."""
     cold = {name: float(own[0]) for name, own in initial.items()}
     if wrong := [name for name, own in initial.items() if np.ptp(own) > 0.0]:
         raise InvalidInputError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -63,9 +62,10 @@ class HeatDeckFile(HeatFile):
 
     def followed(self, show: Callable[[str], None]) -> Iterator[tuple[float, Any, list[HeatState]]]:
         """Yield times with their states, once the tables of the deck are written. Collective."""
-        printed = defaultdict[int, str](str)
+        printed = dict[int, str]()
         for step, time, found in of_heat(self.deck, self.comm, {"partitions": self.partitions}):
-            printed[step] += "".join(of.printout(state, number, time) for of, state, number in found)
+            text = "".join(of.printout(state, number, time) for of, state, number in found)
+            printed[step] = printed.get(step, "") + text
             with together(self.comm):
                 if self.comm.rank == 0 and printed[step]:
                     write_text(self.folder / "prints" / f"step_{step + 1}.dat", printed[step])

@@ -141,6 +141,8 @@ def heat_steps(cards: Sequence[Card], mesh: DeckMesh) -> list[HeatCards]:
         numbers = [*(card.floats(0) if card.lines else []), *[0.0] * 4]
         first, period = (each if each > 0.0 else 1.0 for each in numbers[:2])
         if card.name in HEAT:
+            for given in (each for each in rest if each.name == "TEMPERATURE"):
+                raise given.error("is not known before it is computed: hold it by *BOUNDARY of component 11")
             steady = "STEADYSTATE" in card.parameters
             direct = plain(card.parameters.get("DIRECT", "NO")) != "NO"
             ramped = head.name_of("AMPLITUDE") == "RAMP" and not steady

@@ -90,6 +90,11 @@ PROCEDURES = {
 }  # fmt: skip
 #: Procedures of steps that conduct heat.
 HEAT = {"HEATTRANSFER", "COUPLEDTEMPERATURE-DISPLACEMENT", "UNCOUPLEDTEMPERATURE-DISPLACEMENT"}
+IDLE_PARAMETERS |= {
+    (card, name): "has no effect here, where steps in time have an error of their own, and times go on"
+    for card in HEAT
+    for name in ("DELTMX", "TIMERESET", "END", "MXDEM")
+}
 #: Cards of the model that say how heat is conducted; others have no effect on it.
 HEAT_MODEL = MESH_CARDS | {
     "SOLIDSECTION", "MATERIAL", "ORIENTATION", "DISTRIBUTION", "INITIALCONDITIONS", "CONTACTPAIR",

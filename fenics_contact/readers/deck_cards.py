@@ -406,13 +406,6 @@ def _card(stretches: Sequence[_Stretch]) -> Card:
     )
 
 
-def _require(card: Card, path: Path, what: str) -> None:
-    try:
-        require_file(path, what)
-    except InvalidInputError as error:
-        raise card.error(str(error)) from error
-
-
 def _included(card: Card, folder: Path, inside: tuple[Path, ...]) -> Iterator[_Stretch]:
     given = card.parameters.get("INPUT", "").strip().strip('"')
     if not given:
@@ -420,7 +413,10 @@ def _included(card: Card, folder: Path, inside: tuple[Path, ...]) -> Iterator[_S
     path = folder / given
     if len(inside) > DEEPEST or path in inside:
         raise card.error(f"file {given!r} includes itself: leave one of the two out")
-    _require(card, path, "an included file")
+    try:
+        require_file(path, "an included file")
+    except InvalidInputError as error:
+        raise card.error(str(error)) from error
     yield from _stretches(path, folder, inside)
 
 
@@ -430,7 +426,8 @@ def _with_temperatures(card: Card, folder: Path) -> Card:
         return card
     given, step = card.parameters.get("FILE", "").strip('"'), card.number_of("BSTEP", 1.0)
     now, rows, wanted = "", list[str](), False
-    _require(card, folder / given, "a file of temperatures")
+    if not (folder / given).is_file():
+        raise card.error(f"there must be a file of results, .frd, {given!r}, there is none: correct FILE=")
     for line in (folder / given).read_text("utf-8", errors="replace").splitlines():
         if line[4:10] == "1PSTEP":
             now = line[48:60].strip()

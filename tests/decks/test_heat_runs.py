@@ -118,8 +118,8 @@ def test_a_static_step_has_the_temperatures_of_an_earlier_job(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("card", "words"),
     [
-        ("*TEMPERATURE, FILE=cold.frd\n", "there must be a file of temperatures .*cold.frd"),
-        ("*TEMPERATURE, BSTEP=2\n", "a file of temperatures"),
+        ("*TEMPERATURE, FILE=cold.frd\n", "there must be a file of results, .frd, 'cold.frd'"),
+        ("*TEMPERATURE, BSTEP=2\n", "there must be a file of results, .frd, ''"),
         (
             "*TEMPERATURE, FILE=warm.frd, BSTEP=2\n",
             "needs NT of step 2 in 'warm.frd', and no lines: write it",
@@ -139,6 +139,7 @@ def test_files_without_the_temperatures_of_a_step_are_refused(tmp_path: Path, ca
         ("*FILM, FILM AMPLITUDE=A\n4, F4, 1., 1.\n", r"\*FILM: the parameter FILMAMPLITUDE is not read"),
         ("*RADIATE, CAVITY=A\n4, R4, 1., 1.\n", r"\*RADIATE: the parameter CAVITY is not read"),
         ("*RADIATE\n4, R4CR, 1., 1.\n", "radiation between the surfaces of a cavity is not solved"),
+        ("*TEMPERATURE\nBAR_X1, 5.\n", r"\*TEMPERATURE: is not known before it is computed: hold it by"),
         ("*VIEWFACTOR, READ\n", r"\*VIEWFACTOR: cavities, whose surfaces see each other, are not solved"),
     ],
 )
@@ -164,3 +165,10 @@ def test_fluxes_sources_and_surroundings_follow_amplitudes(tmp_path: Path) -> No
     assert found["Convection"] == pytest.approx(
         0.1 * (0.5 * 80.0 - cold), abs=0.1 * np.ptp(states[-1].values)
     )
+
+
+def test_parameters_without_effect_are_in_the_notes(tmp_path: Path) -> None:
+    text = BAR + steady(COLD).replace("STEADY STATE", "STEADY STATE, DELTMX=5., TIME RESET")
+    notes = read_heat_deck(deck(tmp_path, text)).notes
+    assert any("DELTMX has no effect here, where steps in time have an error" in note for note in notes)
+    assert any("TIMERESET has no effect here" in note for note in notes)
