@@ -219,9 +219,9 @@ def _read(path: Path) -> HeatDeck:
     deck = replace(deck, mesh=mesh, sections=sections, of_element=of_element, components=parts)
     made = replace(_Builder(deck, cards, steps).made(), moving=moves, _cards=given)
     _ = made.notes  # refuses mechanics before anything is solved
-    for card in cards if made.acts_back else ():
-        if card.name in ("HEATTRANSFER", "STATIC", "MODELCHANGE", "CHANGEFRICTION"):
-            raise card.error("does not go with contact that acts on heat: give coupled steps, and all pairs")
+    apart = {"HEATTRANSFER", "STATIC", "MODELCHANGE", "CHANGEFRICTION", "PRE-TENSIONSECTION"}
+    for card in (each for each in cards if made.acts_back and each.name in apart):
+        raise card.error("does not go with contact that acts on heat: give coupled steps alone")
     return made
 
 

@@ -75,11 +75,10 @@ def read_passages(cards: Sequence[Card]) -> dict[str, dict[str, Card]]:
 
 def passage_of(laws: Mapping[str, Card], reach: float) -> dict[str, Any]:
     """Return conductance and heat of friction of surfaces that touch, which is up to a distance."""
-    law, friction = laws.get("GAPCONDUCTANCE"), FrictionHeat(part=0.0)
-    if "GAPHEATGENERATION" in laws:
-        friction = _friction_heat(laws["GAPHEATGENERATION"], laws.get("FRICTION"))
-    nothing = ConductanceTable((), ())
-    return {"conductance": _conductance(law, reach) if law else nothing, "friction": friction}
+    law, heat = laws.get("GAPCONDUCTANCE"), laws.get("GAPHEATGENERATION")
+    friction = _friction_heat(heat, laws.get("FRICTION")) if heat else FrictionHeat(part=0.0)
+    conductance = _conductance(law, reach) if law else ConductanceTable((), ())
+    return {"conductance": conductance, "friction": friction}
 
 
 def _friction_heat(card: Card, friction: Card | None) -> FrictionHeat:

@@ -167,11 +167,13 @@ def _at_nodes(card: Card, mesh: DeckMesh, by: int) -> Iterator[Acting]:
     for row, entries in enumerate(card.rows):
         component = entries[1] if len(entries) > 1 else ""
         if component in ("0", "11"):
+            if {"FIXED", "TYPE"} & set(card.parameters):
+                raise card.error("holds temperatures by their values alone: leave FIXED and TYPE out")
             nodes = mesh.nodes_named(entries[0], card, row)
             value = [*card.floats(row, 1), 0.0, 0.0][place]
             yield Acting(card, row, make, Faces(nodes, np.full(len(nodes), Whole.NODE)), (value,), by)
-        elif card.name == "CFLUX":
-            raise card.error(f"needs node or set, 11 and a heat, got component {component!r}", row)
+        elif card.name == "CFLUX" or entries[2:3] == ["11"]:
+            raise card.error(f"needs node or set, 11 and a number, got component {component!r}", row)
 
 
 def _on_faces(card: Card, mesh: DeckMesh, by: int, constants: tuple[float, ...]) -> Iterator[Acting]:

@@ -184,7 +184,7 @@ REFUSED = {
     "1, P1, 1.": ("*DFLUX", "load 'P1' is not supported: give S1, S2, ... of elements"),
     "1, F1, 20.": ("*FILM", "needs 2 numbers behind 'F1', got 1: add them"),
     "1, R1, 20., 0.5": ("*RADIATE", r"needs \*PHYSICAL CONSTANTS with ABSOLUTE ZERO="),
-    "BAR_X1, 3, 20.": ("*CFLUX", "needs node or set, 11 and a heat, got component '3'"),
+    "BAR_X1, 3, 20.": ("*CFLUX", "needs node or set, 11 and a number, got component '3'"),
     "3, S4, 1.": (
         "*DFLUX",
         "heat must enter on the boundary of a body, a face of element 3 lies between two",

@@ -134,7 +134,7 @@ COUPLED_STEP = coupled(", STEADY STATE", HELD + ENDS)
 REFUSED = {
     "a static step before it": (
         model("*GAP CONDUCTANCE\n0.1\n") + f"*STEP\n*STATIC\n{HELD}*END STEP\n" + COUPLED_STEP,
-        r"\*STATIC: does not go with contact that acts on heat: give coupled steps, and all pairs",
+        r"\*STATIC: does not go with contact that acts on heat: give coupled steps alone",
     ),
     "heat alone before it": (
         model("*GAP CONDUCTANCE\n0.1\n") + steady(ENDS) + COUPLED_STEP,
@@ -145,6 +145,12 @@ REFUSED = {
         + COUPLED_STEP
         + coupled("", "*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nABOVE, BELOW\n"),
         r"\*MODEL CHANGE: does not go with contact that acts on heat",
+    ),
+    "a cut": (
+        "*SURFACE, NAME=CUT\n1, S2\n*NODE\n9999, 9., 9., 9.\n*PRE-TENSION SECTION, SURFACE=CUT, NODE=9999\n"
+        + model("*GAP CONDUCTANCE\n0.1\n")
+        + COUPLED_STEP,
+        r"\*PRE-TENSION SECTION: does not go with contact that acts on heat",
     ),
     "no friction": (
         model("*GAP HEAT GENERATION\n0.9, 0.2, 1.\n") + COUPLED_STEP,

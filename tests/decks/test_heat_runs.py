@@ -140,6 +140,11 @@ def test_files_without_the_temperatures_of_a_step_are_refused(tmp_path: Path, ca
         ("*RADIATE, CAVITY=A\n4, R4, 1., 1.\n", r"\*RADIATE: the parameter CAVITY is not read"),
         ("*RADIATE\n4, R4CR, 1., 1.\n", "radiation between the surfaces of a cavity is not solved"),
         ("*TEMPERATURE\nBAR_X1, 5.\n", r"\*TEMPERATURE: is not known before it is computed: hold it by"),
+        (
+            "*BOUNDARY\nBAR_X1, 1, 11, 5.\n",
+            r"\*BOUNDARY: needs node or set, 11 and a number, got component '1'",
+        ),
+        ("*BOUNDARY, FIXED\nBAR_X1, 11\n", r"\*BOUNDARY: holds temperatures by their values alone"),
         ("*VIEWFACTOR, READ\n", r"\*VIEWFACTOR: cavities, whose surfaces see each other, are not solved"),
     ],
 )
