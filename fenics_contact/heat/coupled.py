@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,23 +21,17 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._equilibrium.previous import ONLY_STEP
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.checks import check_known
-from fenics_contact._scene.effects import EffectName
-from fenics_contact._scene.fields import NodeValues
-from fenics_contact._scene.loads import ThermalStrain
-from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively, together
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.heat.acceleration import Anderson
 from fenics_contact.heat.assembly import Rate
 from fenics_contact.heat.fields import BothOnBodies
-from fenics_contact.heat.friction import FrictionHeat
-from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.interaction import Interaction, check_fit
 from fenics_contact.heat.plausible import odd_power, warn_of
 from fenics_contact.heat.problem import GivenContact, HeatProblem, as_given
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.heat.state import HeatState
-from fenics_contact.materials.elastic import can_expand
 from fenics_contact.results.deformed_state import AnyState
 
 _LOG = logging.getLogger(__name__)
@@ -56,6 +49,7 @@ class HeatedState(BothOnBodies):
         start: Which temperatures the first pass had, in words: of several possible states they choose one.
         gain: Part of a small change of temperatures that a pass returns, estimated from the last two.
         problems: Those that computed it, used again in the next step.
+        interaction: How each enters the other.
     """
 
     mechanics: AnyState
@@ -64,22 +58,19 @@ class HeatedState(BothOnBodies):
     start: str
     gain: float
     problems: tuple[ContactProblem, HeatProblem] = field(repr=False)
+    interaction: Interaction = field(repr=False)
 
 
 @dataclass(eq=False)
 class _Passes:
     """Passes of one step: mechanics at temperatures, then temperatures at its contacts.
 
-    `cold`: temperatures at which bodies are free of stress, by body; `before`: mechanics before the step.
+    `before`: mechanics before the step.
     """
 
-    scene: Scene
-    heat: HeatScene
+    interaction: Interaction
     problems: tuple[ContactProblem, HeatProblem]
-    joints: Joints
-    cold: Mapping[str, float]
     before: AnyState | None
-    duration: float
     rate: Rate
     settled: float
     start: str
@@ -89,12 +80,12 @@ class _Passes:
 
     def run(self, guess: np.ndarray, most: int = 80) -> HeatedState:
         """Return the state in which both agree. Collective."""
-        if not self._mechanics_heats:
-            heat = self._heat(as_given(self.joints))
+        if not self.interaction.mechanics_heats:
+            heat = self._heat(as_given(self.interaction.joints))
             return self._answer(self._mechanics(heat.values), heat)
-        if not (self._expanding or self._rubbing):
+        if not (self.interaction.expanding or self.interaction.rubbing):
             state = self._mechanics(guess)
-            return self._answer(state, self._heat(self._given(state)))
+            return self._answer(state, self._heat(self.interaction.given(state)))
         anderson = Anderson()
         while not self.answers and len(self.known) < most:
             change = self._pass(guess)
@@ -113,45 +104,13 @@ class _Passes:
         )
 
     def _answer(self, state: AnyState, heat: HeatState) -> HeatedState:
-        return HeatedState(state, heat, max(len(self.known), 1), self.start, self.gain, self.problems)
-
-    @cached_property
-    def _pairs(self) -> dict[int, int]:
-        """Number of a thermal contact -> that of the contact pair with its surfaces, where there is one."""
-        pairs = [[pair.slave, pair.master] for pair in self.scene.contacts]
-        sides = [[contact.slave, contact.master] for contact in self.heat.contacts]
-        found = {k: [both in (each, each[::-1]) for each in pairs] for k, both in enumerate(sides)}
-        return {number: same.index(True) for number, same in found.items() if True in same}
-
-    @property
-    def _mechanics_heats(self) -> bool:
-        """Whether temperatures depend on mechanics."""
-        heats = any(law.part > 0.0 for law in self._laws.values())
-        return heats or any(each.law.by_contact for each in self.heat.contacts)
-
-    @property
-    def _laws(self) -> dict[int, FrictionHeat]:
-        """The heat of friction of each thermal contact that has a contact pair, by its number."""
-        return {number: self.heat.contacts[number].friction for number in self._pairs}
-
-    @property
-    def _expanding(self) -> list[str]:
-        """The bodies that temperatures strain."""
-        materials = {name: self.scene.bodies[name].materials for name in self.heat.bodies}
-        return [name for name, given in materials.items() if any(map(can_expand, given))]
-
-    @property
-    def _rubbing(self) -> list[int]:
-        """The thermal contacts whose temperatures change the friction of their pair."""
-        acting = {
-            number: self.scene.contacts[place].effects(self.scene) for number, place in self._pairs.items()
-        }
-        return [k for k, law in self._laws.items() if law.by_temperature and EffectName.COULOMB in acting[k]]
+        count = max(len(self.known), 1)
+        return HeatedState(state, heat, count, self.start, self.gain, self.problems, self.interaction)
 
     def _pass(self, guess: np.ndarray) -> np.ndarray:
         """Return by how much temperatures change in a pass; it is an answer if that is little. Collective."""
         state = self._mechanics(guess)
-        heat = self._heat(self._given(state))
+        heat = self._heat(self.interaction.given(state))
         change = heat.values - guess
         if self.known:
             way, turn = guess - self.known[-1][0], change - self.known[-1][1]
@@ -190,7 +149,7 @@ class _Passes:
                 high, up = guess, change
         if down @ up > 0.0 or np.abs(low - high).max() > 1e-3 * min(np.abs(down).max(), np.abs(up).max()):
             return guess
-        found = (self.joints.sides(x + r)[0].max() for x, r in ((low, down), (high, up)))
+        found = (self.interaction.joints.sides(x + r)[0].max() for x, r in ((low, down), (high, up)))
         raise ConvergenceError(
             "there is no steady state: bodies that touch cool until they part, and warm until they touch "
             "(Barber's thermoelastic contact), surfaces are at {:.6g} or {:.6g} in turn as the conductance "
@@ -200,89 +159,13 @@ class _Passes:
 
     def _mechanics(self, temperature: np.ndarray) -> AnyState:
         """Return the state at temperatures of all nodes. Collective."""
-        scene, (mechanics, temperatures) = self.scene, self.problems
-        tearing, loads = temperatures.decomposition.tearing, [*scene.loads]
-        for name in self._expanding:
-            points = scene.bodies[name].mesh.points
-            own = temperature[tearing.first_of(name) :][: len(points)]
-            loads.append(ThermalStrain(name, NodeValues(points, own - self.cold[name])))
-        heated = replace(scene, loads=loads)
-        if self._rubbing:
-            heated = replace(heated, contacts=self._with_friction(temperature))
-        step, before = ONLY_STEP, self.before
-        if self.duration < np.inf:
-            step = LoadStep("heated", time=self.duration + (0.0 if before is None else before.time))
-        return mechanics.solve(heated, before=before, step=step)
-
-    def _with_friction(self, temperature: np.ndarray) -> list[ContactPair]:
-        """Return the contact pairs with the friction of the temperatures between their surfaces."""
-        pairs, joints = list(self.scene.contacts), self.joints
-        mean = 0.5 * np.sum(joints.sides(temperature), axis=0)
-        for number in self._rubbing:
-            mine, place = np.flatnonzero(joints.points.pair == number), self._pairs[number]
-            table: Any = self._laws[number].coefficient
-            law: Any = pairs[place].friction
-            values = NodeValues(joints.places[mine], table.at(mean[mine]))
-            pairs[place] = replace(pairs[place], friction=replace(law, friction_coefficient=values))
-        return pairs
-
-    def _given(self, state: AnyState) -> GivenContact:
-        """Return the pressures, gaps and work of a state at the points where heat passes. Collective."""
-        points, given, contact = self.joints.points, as_given(self.joints), state.contact
-        names = self.problems[1].decomposition.tearing.body_names
-        moved = np.concatenate([state.gather_displacement(name) for name in names])
-        way = points.relative(moved[:, : points.normal.shape[1]])
-        pressure, gap = given.pressure.copy(), points.gap + np.einsum("nd,nd->n", points.normal, way)
-        work = given.work.copy()
-        lost = np.maximum(np.einsum("na,na->n", contact.friction_force, contact.slip), 0.0) / self.duration
-        table = np.column_stack(
-            [np.ones(len(lost)), contact.nominal_pressure, contact.gap, lost / contact.nominal_area]
-        )
-        for number, place in self._pairs.items():
-            mine = np.flatnonzero(points.pair == number)
-            known, p, g, w = self._at_points(state, number, table)[mine].T
-            pressure[mine], gap[mine] = np.maximum(p, 0.0), np.where(known, g, gap[mine])
-            # Means over other nodes keep the work of the whole pair.
-            w, total = np.maximum(w, 0.0), lost[contact.on_pair(place)].sum()
-            work[mine] = w * (total / (w @ self.joints.area[mine])) if w.any() else w
-        return GivenContact(pressure, gap, work)
-
-    def _at_points(self, state: AnyState, number: int, table: np.ndarray) -> np.ndarray:
-        """Return rows of the points of a contact pair at those of its thermal contact, zero elsewhere."""
-        contact, points, place = state.contact, self.joints.points, self._pairs[number]
-        side = self.scene.contacts[place].slave
-        weights = points.own if side == self.heat.contacts[number].slave else points.master
-        tearings = self.problems[1].decomposition.tearing, state.torn.decomposition.tearing
-        here, there = (tearing.first_of(side.body) for tearing in tearings)
-        nodes, which = contact.points.of_surface(place, np.arange(contact.points.count))
-        fields = np.zeros((weights.shape[1], table.shape[1]))
-        fields[nodes - there + here] = table[which]
-        found = np.asarray(weights @ fields)
-        covered = found[:, :1]
-        return np.where(covered > 0.5, found, 0.0) / np.where(covered > 0.5, covered, 1.0)
+        step, before, duration = ONLY_STEP, self.before, self.interaction.duration
+        if duration < np.inf:
+            step = LoadStep("heated", time=duration + (0.0 if before is None else before.time))
+        return self.problems[0].solve(self.interaction.heated(temperature), before=before, step=step)
 
     def _heat(self, given: GivenContact) -> HeatState:
-        return self.problems[1].solve(self.heat, rate=self.rate, given=given)
-
-
-def _checked(scene: Scene, heat: HeatScene, given: Mapping[str, float]) -> None:
-    """Reject fields on different bodies or meshes, and materials that are free of stress elsewhere."""
-    for name, body in heat.bodies.items():
-        check_known(name, scene.bodies, f"heat is of body {name!r}, the mechanics has")
-        check_known(name, given, f"stress_free needs a temperature of body {name!r}, it has")
-        points, known = body.mesh.points, scene.bodies[name].mesh.points
-        if not np.array_equal(known, points):
-            raise InvalidInputError(
-                f"heat and mechanics need the same mesh of body {name!r}, got {len(points)} nodes for heat, "
-                f"{len(known)} for mechanics: take HeatScene.on(scene, ...)"
-            )
-        materials = scene.bodies[name].materials
-        initial = {getattr(each, "initial_temperature", given[name]) for each in materials}
-        if initial != {given[name]}:
-            raise InvalidInputError(
-                f"body {name!r} must be free of stress at the initial temperature of its materials, "
-                f"{sorted(initial)}, got stress_free {given[name]:g}: give it by stress_free={{...}}"
-            )
+        return self.problems[1].solve(self.interaction.heat, rate=self.rate, given=given)
 
 
 @collectively("solve_heated", lambda scene, heat, comm, **_: comm)
@@ -336,7 +219,7 @@ def solve_heated(
     cold: Any = stress_free if isinstance(stress_free, Mapping) else dict.fromkeys(heat.bodies, stress_free)
     given, old, words = start or {}, cold, "temperatures free of stress"
     with together(comm):
-        _checked(scene, heat, cold)
+        check_fit(scene, heat, cold)
         for name in given:
             check_known(name, heat.bodies, f"start has temperatures of body {name!r}, the heat has")
         materials = [each for body in heat.bodies.values() for each in body.materials]
@@ -357,6 +240,7 @@ def solve_heated(
         )
         rate, mechanics = problems[1].no_rate, None
     first = [np.zeros(body.mesh.n_nodes) + {**old, **given}[name] for name, body in heat.bodies.items()]
-    joints, words = problems[1].joints(heat), "the given temperatures" if start else words
-    passes = _Passes(scene, heat, problems, joints, cold, mechanics, duration, rate, settled, words)
+    tearing, words = problems[1].decomposition.tearing, "the given temperatures" if start else words
+    interaction = Interaction(scene, heat, problems[1].joints(heat), tearing, cold, duration)
+    passes = _Passes(interaction, problems, mechanics, rate, settled, words)
     return passes.run(np.concatenate(first))

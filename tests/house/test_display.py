@@ -147,6 +147,7 @@ from fenics_contact.heat import (
     heat_goal_error,
     heat_in_time,
 )
+from fenics_contact.heat.interaction import Interaction
 from fenics_contact.materials import (
     AnisotropicElasticity,
     FinitePlasticity,
@@ -300,9 +301,17 @@ def heated(contact: ContactProblem, state: AnyState) -> list[Any]:
     held = [HeldTemperature("plate 0", "z0", lambda x: x[:, 0])]
     problem = HeatProblem(HeatScene(bodies, held, [HeatFlux("plate 2", "z1", 1.0)], joints), MPI.COMM_SELF)
     warm = problem.solve()
+    joined = Interaction(
+        contact.scene,
+        problem.scene,
+        warm.joints,
+        problem.decomposition.tearing,
+        dict.fromkeys(names, 0.0),
+        1.0,
+    )
     return [
         heat_in_time(problem.scene, MPI.COMM_SELF, 1.0, 20.0, step=1.0),
-        warm, problem, HeatedState(state, warm, 1, "20 degrees", 0.0, (contact, problem)),
+        warm, problem, HeatedState(state, warm, 1, "20 degrees", 0.0, (contact, problem), joined),
         problem.scene.plan(), Conductor(np.eye(3)),
         ConductanceTable((0.0, 1.0), (0.1, 0.2)), EvenConductance(1.0), PressureConductance(1.0, 1.0),
         GapConductance(1.0, 0.1), GapRadiation(0.5, 0.5), TemperatureTable((0.0, 1.0), (1.0, 2.0)),
