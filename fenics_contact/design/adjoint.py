@@ -429,22 +429,32 @@ def with_slips(state: State, own: Partials, by_slip: np.ndarray) -> Partials:
     They are without the elastic slip of the step.
     """
     torn, alone = state.torn, state.torn.groups.slips.frictionless
-    columns, compliance = torn.free.columns, torn.compliance.contact
     rows = on_owned(torn, torn.tangential_rows.ravel(), by_slip[torn.frictional].ravel())
-    moved = -np.asarray(torn.decomposition.comm.allreduce(columns.T @ rows))
-    by_displacement = own.by_displacement + torn.force(rows)
+    own = with_jumps(state, own, rows)
+    by_displacement = own.by_displacement
     if np.any(by_slip[alone]):  # these have no rows
         jump = torn.points.jump[alone]
         forces = np.einsum("na,nad->nd", by_slip[alone], torn.points.tangents[alone])
         nodes = np.unique(jump.indices)
-        by_displacement += nodal_mean_transposed(torn.decomposition, nodes, jump[:, nodes].T @ forces)
+        turned = nodal_mean_transposed(torn.decomposition, nodes, jump[:, nodes].T @ forces)
+        by_displacement = by_displacement + turned
     return replace(
         own,
         by_displacement=by_displacement,
-        by_multiplier=own.by_multiplier - compliance.sprung(rows),
+        by_multiplier=own.by_multiplier - torn.compliance.contact.sprung(rows),
         by_area=own.by_area - slips_by_area(torn, state.solution.multiplier, rows),
-        by_jump=own.by_jump + rows,
         by_sliding=own.by_sliding + by_slip[alone],
+    )
+
+
+def with_jumps(state: State, own: Partials, rows: np.ndarray) -> Partials:
+    """Return the derivatives of an objective that depends on B u − c, too, by `rows`, owned. Collective."""
+    torn = state.torn
+    moved = -np.asarray(torn.decomposition.comm.allreduce(torn.free.columns.T @ rows))
+    return replace(
+        own,
+        by_displacement=own.by_displacement + torn.force(rows),
+        by_jump=own.by_jump + rows,
         by_motion=own.by_motion + moved,
     )
 

@@ -135,6 +135,10 @@ class SubdomainMesh:
         """Return values by input node of the dolfinx mesh of those by block, (n_blocks, ...)."""
         return values[np.argsort(self.nodes)]
 
+    def from_input_node(self, values: np.ndarray) -> np.ndarray:
+        """Return what does the same work on values by block as these on values by input node, (n, ...)."""
+        return values[np.argsort(np.argsort(self.nodes))]
+
     def acted(self, nodes: np.ndarray) -> np.ndarray:
         """Return which input nodes of the dolfinx mesh lie on some nodes of the body, bool, (n,)."""
         return np.isin(self.nodes, nodes)[np.argsort(self.nodes)]
@@ -194,6 +198,10 @@ class MixedMesh(SubdomainMesh):
     def by_input_node(self, values: np.ndarray) -> np.ndarray:
         """Return values by input node of the dolfinx mesh of those by block."""
         return np.asarray(self.on_input @ values)
+
+    def from_input_node(self, values: np.ndarray) -> np.ndarray:
+        """Return what does the same work on values by block as these on values by input node."""
+        return np.asarray(self.on_input.T @ values)
 
     def acted(self, nodes: np.ndarray) -> np.ndarray:
         """Return which input nodes of the dolfinx mesh depend on some nodes of the body alone."""

@@ -60,6 +60,13 @@ class HeatedState(BothOnBodies):
     problems: tuple[ContactProblem, HeatProblem] = field(repr=False)
     interaction: Interaction = field(repr=False)
 
+    def adjoining(self) -> tuple[Any, ...]:
+        """Return the temperatures for an adjoint, and mechanics that follows them. Collective."""
+        from fenics_contact.heat.coupled_adjoint import Mechanics
+
+        tolerance = self.problems[0].tolerance
+        return self.heat, Mechanics.of(self.interaction, self.mechanics, self.heat.values, tolerance)
+
 
 @dataclass(eq=False)
 class _Passes:

@@ -59,7 +59,7 @@ def heat_goal_error(state: HeatState, objective: HeatObjective, *, tolerance: fl
     adjoint = heat_adjoint(state, objective, tolerance=tolerance)
     decomposition, value = state.torn.decomposition, adjoint.value
     comm, at = decomposition.comm, AtTemperatures.of(state.scene, decomposition, state.values)
-    weight, balanced = adjoint.values - objective.entering(at), adjoint.lagrangian(at)
+    weight, balanced = adjoint.values - objective.partials(at)[2], adjoint.lagrangian(at)
     found, own = _between_gradients(state, weight)
     between, apart = between_points(state, weight)
     geometry, curved = _by_geometry(adjoint, at, weight)

@@ -6,18 +6,69 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fenics_contact._base.checks import checked
-from fenics_contact.errors import together
+from fenics_contact.design.adjoint import WeakChoice, WeakPoints
+from fenics_contact.design.objective import Objective
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_sum
 from fenics_contact.feti.decomposition import Decomposition, prescribed_along
 from fenics_contact.heat.assembly import Assembly, Heated, Rate
+from fenics_contact.heat.conductance import Touch
 from fenics_contact.heat.forms import HeatForms, Part
 from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.problem import GivenContact, as_given
 from fenics_contact.heat.properties import slope_of
 from fenics_contact.heat.scene import HeatScene
+
+if TYPE_CHECKING:
+    from fenics_contact.heat.state import HeatState
+
+
+class NoMechanics:
+    """Nothing moves the bodies: pressures and gaps of contacts are those of the scene."""
+
+    #: Whether temperatures change nothing in it, how J − wᵀ R depends on them through it, what J misses.
+    is_fixed, by_temperature, missing = True, 0.0, 0.0
+    #: Contact points that only just touch, or are about to slip.
+    weak = WeakPoints(0, 0, 0, WeakChoice.RELEASED)
+
+    def of_scenes(self, scenes: Any) -> tuple[HeatScene, Any]:
+        """Return the heat of what a user makes of variables, and the mechanics of it."""
+        return scenes, self
+
+    def at(self, values: np.ndarray, joints: Joints) -> Any:
+        """Return mechanics at temperatures of all nodes, (n_nodes,). Collective."""
+        return self
+
+    def given(self, joints: Joints) -> GivenContact:
+        """Return pressures, gaps and work at the points where heat passes. Collective."""
+        return as_given(joints)
+
+    def check(self, at: AtTemperatures, state: HeatState, quantity: HeatObjective) -> None:
+        """Reject contacts that are not those at temperatures, and what depends on more. Collective."""
+        h = np.zeros(at.joints.points.count)
+        for number, each in enumerate(state.contacts):
+            h[at.joints.points.pair == number] = each.conductance
+        if not np.allclose(h, at.conductance / at.joints.area, rtol=1e-6, atol=0.0):
+            raise InvalidInputError(
+                "an adjoint of heat alone needs the pressures and gaps of its scene, mechanics closed the "
+                "contacts of this state: give the HeatedState, or solve the scene by solve_heat"
+            )
+
+    def value(self, objective: Objective) -> float:
+        """Return a quantity of mechanics. Collective."""
+        raise InvalidInputError(
+            f"{type(objective).__name__} is a quantity of mechanics, and this state has none: take the "
+            "result of solve_heated, or a quantity of heat such as TemperatureMean"
+        )
+
+    def following(self, at: AtTemperatures, quantity: HeatObjective, w: np.ndarray) -> Any:
+        """Return it with its adjoint of J − wᵀ R. Collective."""
+        return self
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,28 +81,43 @@ class AtTemperatures:
     parts: tuple[Part, ...]
     heated: tuple[Heated, ...]
     values: np.ndarray
+    mechanics: NoMechanics
+    given: GivenContact
 
     @classmethod
-    def of(cls, scene: HeatScene, decomposition: Decomposition, values: np.ndarray) -> AtTemperatures:
+    def of(
+        cls,
+        scene: HeatScene,
+        decomposition: Decomposition,
+        values: np.ndarray,
+        mechanics: NoMechanics = NoMechanics(),
+    ) -> AtTemperatures:
         """Assemble a scene whose bodies have the cells of the decomposition. Collective."""
         tearing, forms = decomposition.tearing, HeatForms(decomposition.forms.templates)
         forms.prepare(scene)
         held = prescribed_along(scene.field, tearing)[0][:, 0]
         values = followed(scene, decomposition, np.where(np.isnan(held), values, held))
         parts, joints, heated = forms.parts(scene, decomposition.meshes), Joints.of(scene, decomposition), []
+        mechanics = mechanics.at(values, joints)
+        given = mechanics.given(joints)
         with together(decomposition.comm):
-            touch = joints.touch(values, joints.pressure, joints.points.gap)
-            rubbed = joints.at_nodes(joints.friction(touch, np.zeros(joints.points.count)))
+            touch = joints.touch(values, given.pressure, given.gap)
+            rubbed = joints.at_nodes(joints.friction(touch, given.work))
             for part in parts:
                 nodes = tearing.global_nodes(part.mesh.body, np.arange(part.body.mesh.n_nodes))
                 own, rate = values[nodes], Rate(0.0, values[nodes], ())
                 heated.append(Assembly(part).heated(scene, own, rate, 0, rubbed[nodes]))
-        return cls(scene, decomposition, joints, parts, tuple(heated), values)
+        return cls(scene, decomposition, joints, parts, tuple(heated), values, mechanics, given)
+
+    @cached_property
+    def touch(self) -> Touch:
+        """What conductances depend on at the points."""
+        return self.joints.touch(self.values, self.given.pressure, self.given.gap)
 
     @cached_property
     def conductance(self) -> np.ndarray:
         """The product h A of the points, (n_points,)."""
-        return self.joints.area * self._law(*self.joints.sides(self.values))
+        return self.joints.area * self.joints.conductance(self.touch)
 
     @cached_property
     def passing(self) -> np.ndarray:
@@ -109,10 +175,32 @@ class AtTemperatures:
         through = self._by_law(self.joints.points.jump @ weight) - self._by_friction(weight)
         return self._summed(of_part) + through
 
+    def by_given(self, passing: np.ndarray | float, residual: np.ndarray) -> GivenContact:
+        """Return the derivatives by pressures, gaps and work, one-sided where they are zero.
+
+        Of heat that passes at the points times weights, (n_points,), and R times those of nodes, (n_nodes,).
+        """
+        joints, points = self.joints, self.joints.points
+        sides = np.stack([points.own @ residual, points.master @ residual])
+        across = joints.area * (self.touch.slave - self.touch.master) * (passing + points.jump @ residual)
+
+        def heat(given: GivenContact) -> np.ndarray:
+            touch = replace(self.touch, pressure=given.pressure, gap=given.gap)
+            rubbed = (sides * joints.friction(touch, given.work)).sum(axis=0)
+            return np.asarray(across * joints.conductance(touch) - rubbed)
+
+        found, known = {}, replace(self.given, gap=self.touch.gap)
+        for name in ("pressure", "gap", "work"):
+            at = getattr(known, name)
+            step = 1e-5 * np.where(at > 0.0, at, at.max(initial=0.0) or 1.0)
+            ends = at + step, np.maximum(at - step, 0.0)
+            ahead, behind = (heat(replace(known, **{name: end})) for end in ends)
+            found[name] = (ahead - behind) / (ends[0] - ends[1])
+        return GivenContact(**found)
+
     def _by_friction(self, weight: np.ndarray) -> np.ndarray:
         """Return the derivative by temperatures of friction heat, with weights of nodes, (n_nodes,)."""
-        joints, points = self.joints, self.joints.points
-        touch = joints.touch(self.values, joints.pressure, points.gap)
+        joints, points, touch = self.joints, self.joints.points, self.touch
         none, along = np.zeros(points.count), np.stack([points.own @ weight, points.master @ weight])
 
         def of_mean(change: np.ndarray) -> np.ndarray:
@@ -137,9 +225,7 @@ class AtTemperatures:
         return nodal_sum(self.decomposition, np.concatenate([np.zeros(0), *torn]))[:, 0]
 
     def _law(self, slave: np.ndarray, master: np.ndarray) -> np.ndarray:
-        joints = self.joints
-        touch = joints.touch(self.values, joints.pressure, joints.points.gap)
-        return joints.conductance(replace(touch, slave=slave, master=master))
+        return self.joints.conductance(replace(self.touch, slave=slave, master=master))
 
     def _by_law(self, weight: np.ndarray) -> np.ndarray:
         """Return what conductances that depend on temperatures add to `by_passing`."""
@@ -159,24 +245,44 @@ def followed(scene: HeatScene, decomposition: Decomposition, values: np.ndarray)
     return result
 
 
+#: ∂J/∂T at the nodes of all bodies at fixed pressures and gaps, replicated, (n_nodes,); at fixed T ∂J by heat
+#: that passes at the points, (n_points,), and by R at the nodes, (n_nodes,), which may be zero.
+HeatPartials = tuple[np.ndarray, "np.ndarray | float", "np.ndarray | float"]
+
+
 class HeatObjective(ABC):
     """A quantity J(T) of a scene `AtTemperatures`."""
+
+    #: Quantities of mechanics that it consists of.
+    of_mechanics: tuple[Objective, ...] = ()
 
     @abstractmethod
     def value(self, at: AtTemperatures) -> float:
         """Return J. Collective."""
 
     @abstractmethod
-    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
-        """Return ∂J/∂T at the nodes of all bodies, replicated, (n_nodes,). Collective."""
-
-    def entering(self, at: AtTemperatures) -> np.ndarray:
-        """Return the factors with which heat that enters at nodes is part of J, (n_nodes,): none."""
-        return np.zeros(len(at.values))
+    def partials(self, at: AtTemperatures) -> HeatPartials:
+        """Return the derivatives of J. Collective."""
 
     def size(self, value: float, temperatures: np.ndarray) -> float:
         """Return what errors of J are relative to, by default its size; `temperatures`: of all nodes."""
         return abs(value)
+
+
+class OfMechanics(HeatObjective):
+    """A quantity of the mechanics of a `HeatedState`, which temperatures change through the state alone."""
+
+    def __init__(self, objective: Objective) -> None:
+        """Take a quantity as `ShapeProblem` does."""
+        self.of_mechanics = (objective,)
+
+    def value(self, at: AtTemperatures) -> float:
+        """Return its value."""
+        return at.mechanics.value(*self.of_mechanics)
+
+    def partials(self, at: AtTemperatures) -> HeatPartials:
+        """Return zeros."""
+        return np.zeros(len(at.values)), 0.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -202,10 +308,10 @@ class TemperatureMean(HeatObjective):
         top = float(np.abs(over).max()) or 1.0
         return top * float((weight @ (over / top) ** self.exponent) ** (1.0 / self.exponent))
 
-    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
+    def partials(self, at: AtTemperatures) -> HeatPartials:
         """Return the weights, at larger powers mostly those of the hottest nodes."""
         weight, over = self._over(at)
-        return np.asarray(weight * (over / (self.value(at) or 1.0)) ** (self.exponent - 1.0))
+        return weight * (over / (self.value(at) or 1.0)) ** (self.exponent - 1.0), 0.0, 0.0
 
     def size(self, value: float, temperatures: np.ndarray) -> float:
         """Return the range of temperatures, whose zero may lie anywhere."""
@@ -232,17 +338,13 @@ class HeatOfHeld(HeatObjective):
 
     def value(self, at: AtTemperatures) -> float:
         """Return the sum of the residuals."""
-        return float(self.entering(at) @ at.residual)
+        return float(at.residual[at.nodes(self.body, self.surface)].sum())
 
-    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
+    def partials(self, at: AtTemperatures) -> HeatPartials:
         """Return the rows of these nodes, summed."""
-        return at.transposed(self.entering(at))
-
-    def entering(self, at: AtTemperatures) -> np.ndarray:
-        """Return one at these nodes."""
         weight = np.zeros(len(at.values))
         weight[at.nodes(self.body, self.surface)] = 1.0
-        return weight
+        return at.transposed(weight), 0.0, weight
 
 
 @dataclass(frozen=True)
@@ -260,9 +362,10 @@ class HeatOfContact(HeatObjective):
         """Return the sum over its points."""
         return float(at.passing[at.joints.points.pair == self.contact].sum())
 
-    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
-        """Return the derivative of the sum."""
-        return at.by_passing((at.joints.points.pair == self.contact).astype(float))
+    def partials(self, at: AtTemperatures) -> HeatPartials:
+        """Return the derivatives of the sum."""
+        mine = (at.joints.points.pair == self.contact).astype(float)
+        return at.by_passing(mine), mine, 0.0
 
 
 @dataclass(frozen=True)
@@ -275,10 +378,11 @@ class JointResistance(HeatOfContact):
         slave, master = at.joints.sides(at.values)
         return float(self._share(at) @ (slave - master)) / super().value(at)
 
-    def by_temperature(self, at: AtTemperatures) -> np.ndarray:
-        """Return the derivative of the quotient."""
-        jump = at.joints.points.jump.T @ self._share(at)
-        return np.asarray((jump - self.value(at) * super().by_temperature(at)) / super().value(at))
+    def partials(self, at: AtTemperatures) -> HeatPartials:
+        """Return the derivatives of the quotient."""
+        jump, value, heat = at.joints.points.jump.T @ self._share(at), self.value(at), super().value(at)
+        by_temperature, mine, _ = super().partials(at)
+        return np.asarray(jump - value * by_temperature) / heat, -value / heat * mine, 0.0
 
     def _share(self, at: AtTemperatures) -> np.ndarray:
         area = np.where(at.joints.points.pair == self.contact, at.joints.area, 0.0)

@@ -132,6 +132,10 @@ class HeatState(HeatOnBodies):
     products: int
     seconds: Mapping[str, float]
 
+    def adjoining(self) -> tuple[Any, ...]:
+        """Return the temperatures for an adjoint: no mechanics follows them."""
+        return (self,)
+
     @cached_property
     def temperature(self) -> dict[str, np.ndarray]:
         """Temperatures at the nodes of each body by its name, shape (n_nodes,) each."""

@@ -13,7 +13,6 @@ from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    RigidPlane,
     RigidSphere,
     Scene,
     Support,
@@ -24,7 +23,6 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.gallery.blocks import rectangle_lattice
 from fenics_contact.heat import (
-    Conductance,
     ConductanceTable,
     Conductor,
     FrictionHeat,
@@ -39,46 +37,10 @@ from fenics_contact.heat import (
 )
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain, TemperatureDependentElasticity
 from fenics_contact.mesh.quadratic import quadratic
+from tests.heat.heated_bodies import ALPHA, CONDUCTIVITY, YOUNG, ends, film, rod, rubbed_rod
 
-#: Of Barber's rod: Young's modulus, expansion, conductivity, length, clearance, all without dimension.
-YOUNG, ALPHA, CONDUCTIVITY = 1000.0, 1e-3, 1.0
 #: Weights of its nodes in integrals along it.
 QUARTERS = np.array([0.125, 0.25, 0.25, 0.25, 0.125])
-
-
-def rod(law: Conductance, fixed: float, wall: float, clearance: float) -> tuple[Scene, HeatScene]:
-    """Return a rod of length 1 whose left end is held, at one temperature, before a wall at another one."""
-    material = PlaneStrain(YOUNG, 0.0, thermal_expansion=ALPHA)
-    body = Body(rectangle((0.0, 0.0), (1.0, 0.25), (4, 1)), material)
-    plane, end = RigidPlane((1.0 + clearance, 0.0), (-1.0, 0.0)), Surface("rod", "x1")
-    scene = Scene(
-        {"rod": body},
-        [Support("rod", "x0", (0.0, None)), *(Support("rod", side, (None, 0.0)) for side in ("y0", "y1"))],
-        contacts=[ContactPair(end, plane)],
-    )
-    joint = ThermalContact(end, plane, law, temperature=wall)
-    held = [HeldTemperature("rod", "x0", fixed)]
-    return scene, HeatScene.on(scene, {"rod": Conductor(CONDUCTIVITY)}, held=held, contacts=[joint])
-
-
-def film(rough: float, least: float) -> Conductance:
-    """Return h = rough p + 0.001 / (g + least)."""
-    return PressureConductance(rough, 1.0) + GapConductance(1e-3, least_gap=least)
-
-
-def ends(rough: float, least: float, fixed: float, wall: float, clearance: float) -> list[float]:
-    """Return the temperatures that the free end may have: roots of k (T_A − T) = h(p, g) (T − T_B)."""
-
-    def excess(end: float) -> float:
-        over = ALPHA * 0.5 * (fixed + end) - clearance
-        h = rough * YOUNG * max(over, 0.0) + 1e-3 / (max(-over, 0.0) + least)
-        return CONDUCTIVITY * (fixed - end) - h * (end - wall)
-
-    low, high = sorted([fixed, wall])
-    at = np.linspace(low - 1e-9, high + 1e-9, 4001)
-    values = [excess(x) for x in at]
-    change = [k for k in range(len(at) - 1) if values[k] * values[k + 1] < 0.0]
-    return [brentq(excess, at[k], at[k + 1], xtol=1e-13) for k in change]
 
 
 def end_of(state: HeatedState) -> float:
@@ -217,15 +179,6 @@ def test_a_ring_shrunk_on_a_shaft_loosens_as_it_heats():
     assert state.mechanics.contact.pressure == pytest.approx(pressure, rel=1e-3)
     assert state.heat.contacts[0].flux == pytest.approx(-parts(pressure)[0], rel=1e-4)
     assert pressure < 0.8 * cold.contact.pressure.min()
-
-
-def rubbed_rod(speed: float) -> tuple[Scene, HeatScene]:
-    """Return a rod pressed by 0.002 of its length against an insulating wall that slides on its end."""
-    scene, heat = rod(PressureConductance(1.0, 1.0), 0.0, 0.0, 0.0)
-    scene = replace(scene, contacts=[replace(scene.contacts[0], interference=2e-3)])
-    rubbing = FrictionHeat(0.25, speed, share=1.0)
-    (joint,) = heat.contacts
-    return scene, replace(heat, contacts=[replace(joint, conductance=1e-9, friction=rubbing)])
 
 
 @pytest.mark.claim
