@@ -564,8 +564,8 @@ def state_error(
     The state is u = K⁺(f − Bᵀλ) + R α. Its residuals are r = −(B u − c) along the test directions of the
     face, to which a slipping disc adds κ s, with the part s of its force across the slip: there the law
     requires r + κ s = 0 (`Face.curvature`); the balance G λ − e of the bodies; and n = λ − P_Λ(λ − ρ r) off
-    the face, where the law prescribes the multiplier. One step of Newton's method on the face would remove
-    all of it; along it the objective changes by
+    the face, where the law prescribes the multiplier, λ at points that the face has open. One step of
+    Newton's method on the face would remove all of it; along it the objective changes by
 
         δJ = ζᵀ r + zᵀ κ s − βᵀ(G λ − e) − (∂J/∂λ − B w)ᵀ n_off,
 
@@ -580,6 +580,7 @@ def state_error(
     trial = rows.multiplier - rows.step * rows.residual
     feasible = FeasibleSet(layout, rows.slip_bound)
     miss = rows.multiplier - torn.compliance.contact.resolve(feasible, trial, rows.step)
+    miss[layout.normal] = rows.multiplier[layout.normal]
     slope = partials.by_multiplier - torn.jump(adjoint.displacement)
     tested = rows.residual + _bent(linearised, rows.multiplier)
     shares = adjoint.multiplier * tested - slope * _off_face(miss, linearised, layout)

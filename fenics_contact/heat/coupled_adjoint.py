@@ -54,8 +54,9 @@ class Mechanics(NoMechanics):
     """Mechanics at temperatures, with the forces of a state, and its adjoint.
 
     `problem`: whose last state is that one; `stored`: its forces; `state`: in balance with these forces,
-    which is that of the scene to first order with `missing`; `partials`: of J − wᵀ R by the state, with
-    `adjoint` and the derivative `by_temperature` at all nodes of the heat.
+    which is that of the scene to first order with `missing`; `gives`: to the points where heat passes;
+    `by_given`, `partials`: of J − wᵀ R by that and by the state, with `adjoint` and the derivative
+    `by_temperature` at all nodes of the heat.
     """
 
     interaction: Interaction
@@ -64,6 +65,8 @@ class Mechanics(NoMechanics):
     state: LinearState
     linearised: LinearisedFace
     forms: ShapeForms
+    gives: GivenContact
+    by_given: GivenContact
     partials: Partials
     adjoint: Adjoint
     by_temperature: np.ndarray  # type: ignore[assignment]
@@ -88,9 +91,10 @@ class Mechanics(NoMechanics):
         problem = ContactProblem.following(state, solver=ProjectedCG())  # never directly, without multipliers
         multiplier = np.zeros_like(state.solution.multiplier)
         none = Adjoint(np.zeros_like(state.torn_displacement), multiplier, 0.0 * state.dual_solution.alpha, 0)
+        gives, face = interaction.given(state), linearise_face(state, WeakChoice.RELEASED)
         return cls(
-            interaction, problem, stored_state(state), state, linearise_face(state, WeakChoice.RELEASED),
-            ShapeForms.at_rest(state.torn), Partials.of(state, 0.0), none, np.zeros_like(values),
+            interaction, problem, stored_state(state), state, face, ShapeForms.at_rest(state.torn),
+            gives, gives, Partials.of(state, 0.0), none, np.zeros_like(values),
         )  # fmt: skip
 
     @property
@@ -100,11 +104,15 @@ class Mechanics(NoMechanics):
 
     @property
     def missing(self) -> float:  # type: ignore[override]
-        """What J − wᵀ R misses at forces that are not in equilibrium, to first order. Collective."""
+        """What J − wᵀ R misses at forces that are not in equilibrium, and what these give. Collective.
+
+        To first order, on the side of kinks where `gives` is.
+        """
         coarse = self.state.dual.problem.coarse
         unbalanced = self.adjoint.motions * coarse.residual(self.state.solution.multiplier)
         error = state_error(self.state, self.partials, self.linearised, self.adjoint, unbalanced)
-        return error.correction
+        by, now, then = (vars(x) for x in (self.by_given, self.interaction.given(self.state), self.gives))
+        return error.correction + sum(float(by[name] @ (now[name] - then[name])) for name in by)
 
     def of_scenes(self, scenes: Any) -> tuple[HeatScene, Mechanics]:
         """Return those of a pair of scenes, mechanics and heat."""
@@ -114,13 +122,18 @@ class Mechanics(NoMechanics):
 
     def at(self, values: np.ndarray, joints: Joints) -> Mechanics:
         """Return mechanics with the forces of the state at temperatures of all nodes. Collective."""
+        if joints.points.count != len(self.gives.gap):
+            raise InvalidInputError(
+                f"derivatives need the same points of contact, {len(self.gives.gap)}, got "
+                f"{joints.points.count} after a step: take a smaller step, or other nodes as slaves"
+            )
         interaction = replace(self.interaction, joints=joints)
         state: Any = self.problem.restore(self.stored, interaction.heated(values))
         return replace(self, interaction=interaction, state=state)
 
     def given(self, joints: Joints) -> GivenContact:
-        """Return pressures, gaps and work at the points where heat passes. Collective."""
-        return self.interaction.given(self.state)
+        """Return what the state gives."""
+        return self.gives
 
     def check(self, at: AtTemperatures, state: HeatState, quantity: HeatObjective) -> None:
         """Reject quantities of mechanics that depend on temperatures themselves. Collective."""
@@ -141,21 +154,21 @@ class Mechanics(NoMechanics):
 
     def following(self, at: AtTemperatures, quantity: HeatObjective, w: np.ndarray) -> Mechanics:
         """Solve its adjoint of J − wᵀ R. Collective."""
-        partials, start = self._partials(at, quantity, w), self.adjoint.multiplier
+        _, passing, residual = quantity.partials(at)
+        by, start = at.by_given(passing, residual - w), self.adjoint.multiplier
+        partials = self._partials(quantity, by)
         adjoint, _, partials = adjoint_of(self.state, partials, self.linearised, 1e-11, start)
         total = self._by_friction(at, partials, adjoint)
         for load in self.interaction.strains(at.values):
             first, torn = self.interaction.tearing.first_of(load.body), self.state.torn
             by_nodes = thermal_work_by_temperature(self.forms, torn, load, adjoint.displacement)
             total[first : first + len(by_nodes)] += by_nodes
-        return replace(self, partials=partials, adjoint=adjoint, by_temperature=total)
+        return replace(self, by_given=by, partials=partials, adjoint=adjoint, by_temperature=total)
 
-    def _partials(self, at: AtTemperatures, quantity: HeatObjective, w: np.ndarray) -> Partials:
-        """Return the derivatives of J − wᵀ R by forces and displacements. Collective."""
+    def _partials(self, quantity: HeatObjective, by: GivenContact) -> Partials:
+        """Return the derivatives by forces and displacements, also through what they give. Collective."""
         state, interaction, torn, contact = self.state, self.interaction, self.state.torn, self.state.contact
         points, lost = interaction.joints.points, interaction.lost(state)
-        _, passing, residual = quantity.partials(at)
-        by = at.by_given(passing, residual - w)
         by_pressure, by_gap, by_lost = np.zeros((3, contact.points.count))
         apart = by.gap.copy()
         for _, place, mine, onto in interaction.means(state):

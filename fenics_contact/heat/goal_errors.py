@@ -124,7 +124,7 @@ def _by_geometry(
     bodies = {name: replace(scene.bodies[name], mesh=mesh) for name, mesh in meshes.items()}
     moved = replace(scene, bodies={**scene.bodies, **bodies})
     there = AtTemperatures.of(moved, decomposition, here.values)
-    there = replace(there, joints=replace(here.joints, area=there.joints.area))
+    there = replace(there, joints=replace(here.joints, area=there.joints.area), given=here.given)
     inside = (replace(each, contacts=(), loads=_in_volumes(each)) for each in (scene, moved))
     before, after = (AtTemperatures.of(each, decomposition, here.values).residual for each in inside)
     change = adjoint.lagrangian(there) - adjoint.lagrangian(here) - weight @ (after - before)

@@ -25,6 +25,7 @@ from fenics_contact.heat.joints import Joints
 from fenics_contact.heat.problem import GivenContact, as_given
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.materials.elastic import can_expand
+from fenics_contact.results.contact import Status
 from fenics_contact.results.deformed_state import AnyState
 
 
@@ -136,7 +137,7 @@ class Interaction:
         """Return the power of friction at the points of mechanics, (n_contact,)."""
         contact = state.contact
         work = np.einsum("na,na->n", contact.friction_force, contact.slip)
-        return np.asarray(np.maximum(work, 0.0) / self.duration)
+        return np.where(contact.status == Status.SLIP, np.maximum(work, 0.0), 0.0) / self.duration
 
     def means(self, state: AnyState) -> Iterator[tuple[int, int, np.ndarray, sp.csr_matrix]]:
         """Yield thermal contacts with their pairs: number, pair, points (n,), and means of values of points.

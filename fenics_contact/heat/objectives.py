@@ -180,23 +180,31 @@ class AtTemperatures:
 
         Of heat that passes at the points times weights, (n_points,), and R times those of nodes, (n_nodes,).
         """
-        joints, points = self.joints, self.joints.points
-        sides = np.stack([points.own @ residual, points.master @ residual])
-        across = joints.area * (self.touch.slave - self.touch.master) * (passing + points.jump @ residual)
+        points, across = self.joints.points, self.joints.area * (self.touch.slave - self.touch.master)
+        weights = (
+            across * (passing + points.jump @ residual),
+            -(points.own @ residual),
+            -(points.master @ residual),
+        )
+        return GivenContact(**{name: np.sum(weights * by, axis=0) for name, by in self._slopes.items()})
 
-        def heat(given: GivenContact) -> np.ndarray:
+    @cached_property
+    def _slopes(self) -> dict[str, np.ndarray]:
+        """Slopes of h and of the heat of friction on both sides, (3, n_points), by pressure, gap and work."""
+        known, found = replace(self.given, gap=self.touch.gap), {}
+
+        def laws(given: GivenContact) -> np.ndarray:
             touch = replace(self.touch, pressure=given.pressure, gap=given.gap)
-            rubbed = (sides * joints.friction(touch, given.work)).sum(axis=0)
-            return np.asarray(across * joints.conductance(touch) - rubbed)
+            return np.vstack([self.joints.conductance(touch), self.joints.friction(touch, given.work)])
 
-        found, known = {}, replace(self.given, gap=self.touch.gap)
-        for name in ("pressure", "gap", "work"):
+        sizes = {"pressure": known.pressure, "gap": np.ptp(self.scene.geometry.points), "work": known.work}
+        for name, size in sizes.items():
             at = getattr(known, name)
-            step = 1e-5 * np.where(at > 0.0, at, at.max(initial=0.0) or 1.0)
+            step = np.maximum(1e-5 * at, 1e-9 * (np.max(size, initial=0.0) or 1.0))
             ends = at + step, np.maximum(at - step, 0.0)
-            ahead, behind = (heat(replace(known, **{name: end})) for end in ends)
+            ahead, behind = (laws(replace(known, **{name: end})) for end in ends)
             found[name] = (ahead - behind) / (ends[0] - ends[1])
-        return GivenContact(**found)
+        return found
 
     def _by_friction(self, weight: np.ndarray) -> np.ndarray:
         """Return the derivative by temperatures of friction heat, with weights of nodes, (n_nodes,)."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface
+from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, Tie
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.heat import (
     Conductance,
@@ -39,7 +39,11 @@ RING = np.array([2.0, 1.0, 20.0, 0.2, 1e-3])
 RUB = np.array([1.5, 2.0, 0.3, 0.01, 1e-5])
 #: As for the gap, of surfaces that touch in part.
 CURVED = np.array([1.5, 3.0, 60.0, 0.02, 1e-5])
-#: The same where nothing touches.
+#: Conductivity, thickness, temperature that is held, how far a side bulges, thermal expansion.
+LAYERS = np.array([1.5, 0.7, 60.0, 0.05, 4e-4])
+#: As for the gap, of cubes whose sides lean.
+CUBES = np.array([1.5, 3.0, 60.0, 0.05, 4e-4])
+#: As for surfaces that touch in part, where nothing does.
 APART = np.array([1.5, 3.0, 60.0, 0.02, 1e-4])
 
 
@@ -92,6 +96,52 @@ def touching_in_part(p: np.ndarray, *, other_way: bool = False, apart: bool = Fa
         held=[HeldTemperature("upper", "y1", hot)],
         loads=[Convection("lower", "y0", film, 0.0)],
         contacts=[ThermalContact(*(sides[::-1] if other_way else sides), law)],
+    )
+
+
+def layers(p: np.ndarray) -> Scenes:
+    """Return a block under a tied layer that grows against another block, and one without heat."""
+    k, thickness, hot, far, expansion = p
+    material = PlaneStrain(1000.0, 0.3, thermal_expansion=expansion, thickness=thickness)
+    meshes = {
+        "beside": rectangle((3.0, 0.0), (4.0, 1.0), (1, 1)),
+        "upper": rectangle((0.1, 1.305), (0.9, 2.0), (3, 2)),
+        "layer": rectangle((0.0, 1.0), (1.0, 1.3), (3, 1)),
+        "lower": bulging(rectangle((0.0, 0.0), (1.0, 1.0), (4, 3)), far, 0.5, 1.0),
+    }
+    bodies = {name: Body(mesh, material) for name, mesh in meshes.items()}
+    sides = Surface("upper", "y0"), Surface("layer", "y1")
+    tie = Tie(Surface("layer", "y0"), Surface("lower", "y1"))
+    held = [Support("lower", "y0"), Support("upper", "y1"), Support("beside", "y0")]
+    scene = Scene(bodies, held, contacts=[ContactPair(*sides)], ties=[tie])
+    law = PressureConductance(0.05, 1.0) + GapConductance(1e-2, 0.01)
+    return scene, HeatScene.on(
+        scene,
+        {"lower": Conductor(k), "layer": Conductor(3.0), "upper": Conductor(2.0)},
+        held=[HeldTemperature("upper", "y1", hot)],
+        loads=[Convection("lower", "y0", 2.0, 0.0)],
+        contacts=[ThermalContact(*sides, law)],
+    )
+
+
+def cubes(p: np.ndarray, lower: BodyMesh) -> Scenes:
+    """Return a cube of given cells that grows against one of hexahedra."""
+    k, film, hot, far, expansion = p
+    points = lower.points.copy()
+    points[:, 0] += far * np.sin(2.0 * points[:, 2]) * points[:, 0]
+    material = IsotropicElasticity(1000.0, 0.3, thermal_expansion=expansion)
+    upper = block((0.0, 0.0, 1.005), (1.0, 1.0, 2.0), (2, 2, 2))
+    bodies = {"lower": Body(lower.moved(points), material), "upper": Body(upper, material)}
+    sides = Surface("lower", "z1"), Surface("upper", "z0")
+    held = [Support("lower", "z0"), Support("upper", "z1")]
+    scene = Scene(bodies, held, contacts=[ContactPair(*sides)])
+    law = PressureConductance(0.05, 1.0) + GapConductance(1e-2, 0.01)
+    return scene, HeatScene.on(
+        scene,
+        {"lower": Conductor(k), "upper": Conductor(2.0)},
+        held=[HeldTemperature("upper", "z1", hot)],
+        loads=[Convection("lower", "z0", film, 0.0)],
+        contacts=[ThermalContact(*sides, law)],
     )
 
 

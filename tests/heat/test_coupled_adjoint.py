@@ -13,6 +13,7 @@ from mpi4py import MPI
 from fenics_contact.design import FrictionWork, LargestPressure, LargestStress, Movement, VolumeIntegral
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block
 from fenics_contact.heat import (
     Conductor,
     HeatedState,
@@ -28,22 +29,29 @@ from fenics_contact.heat import (
 from fenics_contact.heat.joints import Joints
 from fenics_contact.heat.objectives import AtTemperatures, NoMechanics
 from fenics_contact.heat.problem import GivenContact
+from fenics_contact.mesh import refined
 from tests.heat.heated_bodies import (
+    ALPHA,
     APART,
+    CUBES,
     CURVED,
     GAP,
+    LAYERS,
     RING,
     RUB,
     Scenes,
+    cubes,
     ends,
     film,
     gap_that_closes,
+    layers,
     rod,
     rubbed_rod,
     rubbing,
     shrink_fit,
     touching_in_part,
 )
+from tests.heat.manufactured import prisms
 
 Goal = Any
 
@@ -146,19 +154,43 @@ def test_a_rod_that_cools_where_it_touches_changes_as_its_closed_form_does(rough
     assert found.gradient(scenes, at) == pytest.approx([by_hot, by_clearance], rel=1e-6)
 
 
+def test_a_rod_that_only_just_touches_has_the_derivatives_of_one_side():
+    end = 100.0 / (1.0 + 1e-3 / 0.01)  # without a gap, and without a pressure
+    at = np.array([100.0, ALPHA * 0.5 * (100.0 + end)])
+
+    def scenes(p: np.ndarray) -> Scenes:
+        return rod(film(1.0, 0.01), p[0], 0.0, p[1])
+
+    def one_sided(step: np.ndarray) -> float:
+        values = [ends(1.0, 0.01, hot, 0.0, gap)[0] for hot, gap in (at + k * step for k in range(3))]
+        return float((-3.0 * values[0] + 4.0 * values[1] - values[2]) / (2.0 * step.sum()))
+
+    state = solved(scenes(at))
+    contact = state.mechanics.contact
+    assert np.abs(contact.gap).max() < 1e-11
+    assert contact.normal_force.max() < 1e-8
+    opening, closing = (
+        [one_sided(np.array([-1e-3 * way, 0.0])), one_sided(np.array([0.0, 1e-6 * way]))] for way in (1, -1)
+    )
+    assert np.abs(np.array(closing) / opening - 1.0).min() > 1.0
+    # Steps are longer than the way to the other side.
+    gradient = heat_adjoint(state, TemperatureMean("rod", "x1")).gradient(scenes, at)
+    assert gradient == pytest.approx(closing if contact.normal_force.any() else opening, rel=1e-5)
+
+
 @pytest.mark.claim
 def test_derivatives_of_a_gap_that_closes_by_all_variables():
     more = HeatOfHeld("upper", "y1"), Movement("lower", "y1", (0.0, 1.0)), LargestStress("lower")
     check(gap_that_closes, GAP, [*JOINT, *more])
 
 
-@pytest.mark.claim
+@pytest.mark.slow
 @pytest.mark.parametrize("other_way", [False, True])
 def test_derivatives_of_surfaces_that_touch_in_part(other_way: bool):
     check(lambda p: touching_in_part(p, other_way=other_way), CURVED, JOINT)
 
 
-@pytest.mark.claim
+@pytest.mark.slow
 def test_derivatives_by_gaps_that_displacements_leave():
     goals = [TemperatureMean("lower"), HeatOfContact(0), Movement("lower", "y1", (0.0, 1.0))]
     check(lambda p: touching_in_part(p, apart=True), APART, goals)
@@ -176,10 +208,30 @@ def test_derivatives_where_sliding_heats(falling: bool):
     check(lambda p: rubbing(p, falling=falling), RUB, [*JOINT, HeatOfHeld("upper", "y1"), FrictionWork(0)])
 
 
-@pytest.mark.claim
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["node", "mortar"])
 def test_derivatives_where_the_work_of_friction_heats(how: str):
     check(lambda p: rubbing(p, speed=0.0, how=how), RUB, JOINT, duration=0.05)
+
+
+@pytest.mark.slow
+def test_derivatives_where_only_some_points_slip():
+    partly = np.array([*RUB[:2], 0.01 * RUB[2], *RUB[3:]])
+    check(lambda p: rubbing(p, speed=0.0), partly, [*JOINT, FrictionWork(0)], duration=1e-3)
+
+
+@pytest.mark.slow
+def test_derivatives_by_thickness_and_shape_of_tied_bodies():
+    check(layers, LAYERS, [TemperatureMean("layer"), JointResistance(0), LargestPressure(0)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["prisms", "hanging"])
+def test_derivatives_of_cells_whose_nodes_follow_others(kind: str):
+    whole = block((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (2, 2, 2))
+    lower = prisms(2) if kind == "prisms" else refined(whole, np.array([7])).mesh
+    assert bool(lower.hanging) == (kind == "hanging")
+    check(lambda p: cubes(p, lower), CUBES, [JointResistance(0), LargestPressure(0)])
 
 
 @pytest.mark.claim
