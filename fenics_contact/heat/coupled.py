@@ -3,8 +3,10 @@
 Mechanics at temperatures T leads to temperatures G(T), and the answer is a fixed point of G. Where touching
 warms bodies, which then press harder, G rises: there may be several fixed points, and repeating G leads to
 stable ones. Where it cools them, G falls: repeating it alternates, combining passes finds the fixed point,
-and there is none where conductance jumps as contact opens (J. R. Barber, J. Elasticity 8 (1978) 409-423; J.
-R. Barber, J. Dundurs, M. Comninou, J. Appl. Mech. 47 (1980) 871-874).
+where films are steep Newton's method does, and there is none where conductance jumps as contact opens (J. R.
+Barber, J. Elasticity 8 (1978) 409-423; J. R. Barber, J. Dundurs, M. Comninou, J. Appl. Mech. 47 (1980)
+871-874). Tangents are differences of passes, which hold for any material and law (D. A. Knoll, D. E. Keyes,
+Jacobian-free Newton-Krylov methods, J. Comput. Phys. 193 (2004) 357-397).
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from fenics_contact.heat.plausible import odd_power, warn_of
 from fenics_contact.heat.problem import GivenContact, HeatProblem, as_given
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.heat.state import HeatState
+from fenics_contact.qp.krylov import gmres
 from fenics_contact.results.deformed_state import AnyState
 
 _LOG = logging.getLogger(__name__)
@@ -85,8 +88,11 @@ class _Passes:
     gain: float = 0.0
     answers: list[HeatedState] = field(default_factory=list)
 
-    def run(self, guess: np.ndarray, most: int = 80) -> HeatedState:
-        """Return the state in which both agree. Collective."""
+    def run(self, guess: np.ndarray, early: int = 30, most: int = 80) -> HeatedState:
+        """Return the state in which both agree. Collective.
+
+        `early`: passes after which Newton's method takes over, unless changes grow; earlier where they turn.
+        """
         if not self.interaction.mechanics_heats:
             heat = self._heat(as_given(self.interaction.joints))
             return self._answer(self._mechanics(heat.values), heat)
@@ -94,20 +100,25 @@ class _Passes:
             state = self._mechanics(guess)
             return self._answer(state, self._heat(self.interaction.given(state)))
         anderson = Anderson()
-        while not self.answers and len(self.known) < most:
+        for count in range(1, most + 1):
             change = self._pass(guess)
+            if self.answers:
+                return self.answers[0]
+            large = np.linalg.norm(change) > 1e-3 * np.linalg.norm(self.known[0][1])
+            turning = large and count == 10 and any(change @ r < 0.0 for _, r in self.known[-6:])
+            if turning or (count >= early and self.gain <= 1.0):
+                return self._newton(guess, change)
             if self.gain > 1.0:  # follow what grows to where it grows no more
                 anderson, guess = Anderson(), guess + change
             else:
                 guess = anderson.next(guess, guess + change)
-            large = np.linalg.norm(change) > 1e-3 * np.linalg.norm(self.known[0][1])
-            if large and len(self.known) == 10 and any(change @ r < 0.0 for _, r in self.known[-6:]):
-                anderson, guess = Anderson(), self._between()
-        if self.answers:
-            return self.answers[0]
-        raise ConvergenceError(
-            f"temperatures and contact do not settle: after {most} passes temperatures still change by "
-            f"{np.abs(change).max():.2g}; start from a state nearby by start=..., or heat in steps"
+        raise self._unsettled(change)
+
+    def _unsettled(self, change: np.ndarray) -> ConvergenceError:
+        return ConvergenceError(
+            f"temperatures and contact do not settle: after {len(self.known)} passes temperatures still "
+            f"change by {np.abs(change).max():.2g}; start from a state nearby by start=..., heat in steps, "
+            "or give a smaller tolerance if little is missing"
         )
 
     def _answer(self, state: AnyState, heat: HeatState) -> HeatedState:
@@ -137,31 +148,66 @@ class _Passes:
             )
         return change
 
-    def _between(self, halvings: int = 16) -> np.ndarray:
-        """Return temperatures between two passes with opposite changes, the last ones tried. Collective.
+    def _newton(self, guess: np.ndarray, change: np.ndarray, most: int = 400) -> HeatedState:
+        """Return the state by Newton's method for G(T) − T = 0. Collective."""
+        while not self.answers:
+            before = np.linalg.norm(change)
+            guess, change = self._along(guess, change, self._direction(guess, change))
+            stuck = np.linalg.norm(change) > (1.0 - 1e-9) * before
+            if not self.answers and (stuck or len(self.known) >= most):
+                raise self._unsettled(change)
+        return self.answers[0]
 
-        Raises where changes stay large and opposite however close the temperatures: there conductance jumps.
+    def _direction(self, guess: np.ndarray, change: np.ndarray, probe: float = 1e-7) -> np.ndarray:
+        """Return d with (1 − G′) d = G(T) − T to a tenth, (n_nodes,). Collective.
+
+        `probe`: size of the steps whose differences are G′ d, relative to the range of temperatures.
         """
-        low, down = self.known[-1]
-        high, up = next((x, r) for x, r in reversed(self.known) if r @ down < 0.0)
-        first = min(np.linalg.norm(down), np.linalg.norm(up))
+        scale = float(np.ptp([*guess, *(guess + change)]))
+
+        def expand(way: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+            step = probe * scale / np.abs(way).max()
+            return (change - self._pass(guess + step * way)) / step, (way,)
+
+        enough, size = 0.1 * float(np.linalg.norm(change)), len(guess)
+        way = gmres(MPI.COMM_SELF, change, expand, enough, min(size, 100), size).combined(0, size)
+        return np.asarray(way * min(1.0, 10.0 * scale / np.abs(way).max(initial=1e-300)))
+
+    def _along(
+        self, guess: np.ndarray, change: np.ndarray, way: np.ndarray, halvings: int = 36
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return temperatures on a way which change less, and their change. Collective.
+
+        Where changes turn round between two temperatures on the way, it looks for those between. Raises where
+        they stay large and opposite however close these are: there conductance jumps.
+        """
+        size, along, best = np.linalg.norm(change), abs(change @ way), (guess, change)
+        low, high, part = (0.0, change), (0.0, change), 1.0
         for _ in range(halvings):
-            guess = 0.5 * (low + high)
-            change = self._pass(guess)
-            if self.answers or np.linalg.norm(change) < 0.05 * first:
-                return guess
-            if change @ down > 0.0:
-                low, down = guess, change
+            at = guess + part * way
+            found = self._pass(at)
+            left = np.linalg.norm(found)
+            if left < np.linalg.norm(best[1]):
+                best = at, found
+            less, between = left < (1.0 - 1e-4 * part) * size, abs((found - high[1]) @ way) > 0.5 * along
+            if self.answers or left < 0.7 * size or (less and not (high[0] and between)):
+                return best
+            if less and (found @ way) * (change @ way) > 0.0:
+                low = part, found
             else:
-                high, up = guess, change
-        if down @ up > 0.0 or np.abs(low - high).max() > 1e-3 * min(np.abs(down).max(), np.abs(up).max()):
-            return guess
-        found = (self.interaction.joints.sides(x + r)[0].max() for x, r in ((low, down), (high, up)))
-        raise ConvergenceError(
+                high = part, found
+            part = 0.5 * (low[0] + high[0])
+        if abs((high[1] - low[1]) @ way) > 0.5 * along and (high[1] @ way) * (low[1] @ way) < 0.0:
+            raise self._jumping(*(guess + t * way + r for t, r in (low, high)))
+        return best
+
+    def _jumping(self, *temperatures: np.ndarray) -> ConvergenceError:
+        found = (self.interaction.joints.sides(each)[0].max() for each in temperatures)
+        return ConvergenceError(
             "there is no steady state: bodies that touch cool until they part, and warm until they touch "
             "(Barber's thermoelastic contact), surfaces are at {:.6g} or {:.6g} in turn as the conductance "
             "jumps where contact opens: give one that is continuous, such as a PressureConductance plus a "
-            "GapConductance".format(*found)
+            "GapConductance".format(*sorted(found))
         )
 
     def _mechanics(self, temperature: np.ndarray) -> AnyState:
@@ -209,7 +255,7 @@ def solve_heated(
             order, and friction forces times slips become heat; by default so long that a steady state is
             reached, in which prescribed speeds alone heat.
         partitions: As for `solve_scene`.
-        tolerance: Largest relative residual of mechanics.
+        tolerance: Largest relative residual of mechanics; it bounds how steep films may be.
         settled: Largest change of temperatures in the last pass, relative to their range.
 
     Raises:

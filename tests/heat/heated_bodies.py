@@ -214,12 +214,14 @@ def film(rough: float, least: float) -> Conductance:
     return PressureConductance(rough, 1.0) + GapConductance(1e-3, least_gap=least)
 
 
-def ends(rough: float, least: float, fixed: float, wall: float, clearance: float) -> list[float]:
+def ends(
+    rough: float, least: float, fixed: float, wall: float, clearance: float, conductivity: float = 1e-3
+) -> list[float]:
     """Return the temperatures that the free end may have: roots of k (T_A − T) = h(p, g) (T − T_B)."""
 
     def excess(end: float) -> float:
         over = ALPHA * 0.5 * (fixed + end) - clearance
-        h = rough * YOUNG * max(over, 0.0) + 1e-3 / (max(-over, 0.0) + least)
+        h = rough * YOUNG * max(over, 0.0) + conductivity / (max(-over, 0.0) + least)
         return CONDUCTIVITY * (fixed - end) - h * (end - wall)
 
     low, high = sorted([fixed, wall])

@@ -56,6 +56,51 @@ def test_a_rod_that_cools_where_it_touches_has_one_state():
         assert state.gain < 0.0
 
 
+def test_a_film_that_opens_within_a_millionth_of_the_length_has_a_state():
+    # A pass returns hundreds of times what temperatures change by.
+    law = PressureConductance(1.0, 1.0) + GapConductance(1e-5, least_gap=1e-6)
+    (exact,) = ends(1.0, 1e-6, 100.0, 0.0, 0.08, conductivity=1e-5)
+    state = solve_heated(*rod(law, 100.0, 0.0, 0.08), MPI.COMM_SELF)
+    assert end_of(state) == pytest.approx(exact, rel=1e-6)
+    assert state.gain < -100.0
+    assert state.passes < 60
+
+
+@pytest.mark.claim
+def test_films_steeper_than_mechanics_is_accurate_need_a_smaller_tolerance():
+    law = PressureConductance(1.0, 1.0) + GapConductance(1e-6, least_gap=1e-7)
+    (exact,) = ends(1.0, 1e-7, 100.0, 0.0, 0.08, conductivity=1e-6)
+    scenes = rod(law, 100.0, 0.0, 0.08)
+    with pytest.raises(ConvergenceError, match=r"do not settle: after .* give a smaller tolerance if little"):
+        solve_heated(*scenes, MPI.COMM_SELF)
+    state = solve_heated(*scenes, MPI.COMM_SELF, tolerance=1e-12)
+    assert end_of(state) == pytest.approx(exact, rel=1e-7)
+
+
+@pytest.mark.claim
+def test_a_block_that_touches_at_many_points_and_conducts_nowhere_else_has_a_state():
+    # Each point opens and closes with its neighbours: no steady state lies between two passes.
+    mesh = rectangle((0.0, 0.0), (2.0, 1.0), (12, 6))
+    points = mesh.points - 1e-3 * np.outer(mesh.points.prod(axis=1), (0.0, 1.0))
+    bodies = {
+        "lower": Body(replace(mesh, points=points), PlaneStrain(YOUNG, 0.3, thermal_expansion=1e-4)),
+        "upper": Body(rectangle((-0.2, 1.011), (2.2, 2.011), (15, 6)), PlaneStrain(10.0 * YOUNG, 0.3)),
+    }
+    sides = Surface("lower", "y1"), Surface("upper", "y0")
+    held = [Support("lower", "y0"), Support("upper", "y1")]
+    scene = Scene(bodies, held, contacts=[ContactPair(*sides)])
+    ends_held = [HeldTemperature("lower", "y0", 100.0), HeldTemperature("upper", "y1", 0.0)]
+    joint = ThermalContact(*sides, PressureConductance(1000.0, 1.0))
+    conductors = {"lower": Conductor(1.0), "upper": Conductor(2.0)}
+    heat = HeatScene.on(scene, conductors, held=ends_held, contacts=[joint])
+    state = solve_heated(scene, heat, MPI.COMM_SELF)
+    again = solve_heated(scene, heat, MPI.COMM_SELF, start=state.heat.temperature)
+    assert 4 < (state.mechanics.contact.normal_force > 0.0).sum() < 9
+    assert state.heat.contacts[0].total > 50.0
+    assert np.abs(again.heat.values - state.heat.values).max() < 1e-4
+    assert state.heat.balance.error < 1e-11
+
+
 @pytest.mark.claim
 def test_a_rod_that_warms_where_it_touches_has_the_state_that_its_start_leads_to():
     apart, between, touching = ends(30.0, 0.02, 0.0, 100.0, 0.035)
