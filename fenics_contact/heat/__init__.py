@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         harmonic_mean,
     )
     from fenics_contact.heat.coupled import HeatedState, solve_heated
+    from fenics_contact.heat.coupled_time import heated_in_time
     from fenics_contact.heat.friction import FrictionHeat, effusivity_share
     from fenics_contact.heat.goal_errors import heat_goal_error
     from fenics_contact.heat.levels import solve_heat_to
@@ -78,6 +79,7 @@ __all__ = [
     "heat_adjoint",
     "heat_goal_error",
     "heat_in_time",
+    "heated_in_time",
     "solve_heat",
     "solve_heat_to",
     "solve_heated",

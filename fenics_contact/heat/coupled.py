@@ -72,7 +72,7 @@ class HeatedState(BothOnBodies):
 
 
 @dataclass(eq=False)
-class _Passes:
+class Passes:
     """Passes of one step: mechanics at temperatures, then temperatures at its contacts.
 
     `before`: mechanics before the step.
@@ -221,6 +221,11 @@ class _Passes:
         return self.problems[1].solve(self.interaction.heat, rate=self.rate, given=given)
 
 
+def by_body(given: float | Mapping[str, float], heat: HeatScene) -> Mapping[str, float]:
+    """Return a number for each body, given for all or by body."""
+    return given if isinstance(given, Mapping) else dict.fromkeys(heat.bodies, given)
+
+
 @collectively("solve_heated", lambda scene, heat, comm, **_: comm)
 def solve_heated(
     scene: Scene,
@@ -269,8 +274,9 @@ def solve_heated(
         >>> steady = solve_heated(scene, heat, comm, stress_free=20.0)  # doctest: +SKIP
         >>> later = solve_heated(scene, heat, comm, before=steady, duration=5.0)  # doctest: +SKIP
     """
-    cold: Any = stress_free if isinstance(stress_free, Mapping) else dict.fromkeys(heat.bodies, stress_free)
-    given, old, words = start or {}, cold, "temperatures free of stress"
+    cold = by_body(stress_free, heat)
+    old: Mapping[str, float | np.ndarray] = cold
+    given, words = start or {}, "temperatures free of stress"
     with together(comm):
         check_fit(scene, heat, cold)
         for name in given:
@@ -295,5 +301,5 @@ def solve_heated(
     first = [np.zeros(body.mesh.n_nodes) + {**old, **given}[name] for name, body in heat.bodies.items()]
     tearing, words = problems[1].decomposition.tearing, "the given temperatures" if start else words
     interaction = Interaction(scene, heat, problems[1].joints(heat), tearing, cold, duration)
-    passes = _Passes(interaction, problems, mechanics, rate, settled, words)
+    passes = Passes(interaction, problems, mechanics, rate, settled, words)
     return passes.run(np.concatenate(first))

@@ -60,6 +60,7 @@ class HeatProblem:
         comm: Communicator over which the subdomains are spread.
         tolerance: Largest relative residual of linear systems.
         timer: Wall time of this rank by phase, over all solutions.
+        products: Applications of dual operators, of all solutions.
         state: The last solution, None before the first.
     """
 
@@ -80,7 +81,7 @@ class HeatProblem:
                 "are solved by solve_scene, those of both by solve_heated"
             )
         self.scene, self.comm, self.tolerance = scene, comm, tolerance
-        self.timer, self.state = PhaseTimer(), None
+        self.timer, self.state, self.products = PhaseTimer(), None, 0
         self._partitions = partitions
         self._decomposition: Decomposition | None = None
         self._assemblies: tuple[Assembly, ...] = ()
@@ -146,6 +147,7 @@ class HeatProblem:
         iteration = _Iteration(self, scene, decomposition, joints, rate or self.no_rate,
                                given or as_given(joints))  # fmt: skip
         self.state = iteration.run(self.state, most)
+        self.products += self.state.products
         return self.state
 
     def joints(self, scene: HeatScene) -> Joints:

@@ -132,6 +132,11 @@ class HeatState(HeatOnBodies):
     products: int
     seconds: Mapping[str, float]
 
+    @property
+    def heat(self) -> HeatState:
+        """Itself: what it has in common with a `HeatedState`."""
+        return self
+
     def adjoining(self) -> tuple[Any, ...]:
         """Return the temperatures for an adjoint: no mechanics follows them."""
         return (self,)

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, inf, isfinite, nan
-from typing import Any, Literal, TypeAlias
+from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from fenics_contact.heat.scene import HeatScene
 from fenics_contact.heat.state import HeatBalance, HeatState
 
 _LOG = logging.getLogger(__name__)
+#: What is known at a time: a `HeatState`, or that of both fields.
+Known = TypeVar("Known", bound=Any)
 #: Takes a step and that before; returns a, b, c of the rate of heat at its end, a ΔH − b ΔH₋₁ − c q₋₁, with
 #: ΔH what is stored in a step, and ΔH₋₁ and q₋₁ of the step before and at its end.
 Weights: TypeAlias = Callable[[float, float], tuple[float, float, float]]
@@ -49,15 +51,78 @@ def _scheme(given: str | float) -> Weights:
     return named[given] if given in named else _theta(float(given))
 
 
+class March(Protocol):
+    """What leads from the state at one time to that at the next."""
+
+    @property
+    def problem(self) -> HeatProblem:
+        """The heat."""
+
+    @property
+    def doubt(self) -> float:
+        """Least error of a step by the difference from twice as long ones."""
+
+    def end(self, last: Any, time: float, step: float, rate: Rate) -> Any:
+        """Return the state at the end of a step after the last one, with its `heat`. Collective."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """How long a history is, and its steps, see `heat_in_time`."""
+
+    duration: float
+    step: float
+    tolerance: float
+    scheme: str | float
+    begin: int
+    outputs: Sequence[float]
+
+    def __post_init__(self) -> None:
+        """Reject what is outside its range."""
+        least = min(self.step, self.tolerance)
+        check_positive("duration", self.duration, "give the end of the history")
+        check_positive("step or tolerance", least, "give the length of steps, or their error")
+        if self.begin < 1 or not all(0.0 < time <= self.duration for time in self.outputs):
+            needed = f"begin must be at least 1 and outputs lie above 0 and up to {self.duration:g}"
+            raise InvalidInputError(f"{needed}, got {self.begin} and {tuple(self.outputs)}: correct them")
+
+
+@dataclass(frozen=True, eq=False)
+class _HeatAlone:
+    """Temperatures of a scene that depends on time."""
+
+    problem: HeatProblem
+    at: Callable[[float], HeatScene]
+    doubt: float = 1.0
+
+    def end(self, last: Any, time: float, step: float, rate: Rate) -> HeatState:
+        scene = scene_at(self.at, time, self.problem.scene, self.problem.comm)
+        return self.problem.solve(scene, rate=rate)
+
+
+def scene_at(at: Callable[[float], Any], time: float, known: Any, comm: MPI.Comm) -> Any:
+    """Return the scene of a time, which must have the bodies of a known one. Collective."""
+    with together(comm), user_code("the scene as a function of time"):
+        scene = at(time)
+        if dict(scene.bodies) != dict(known.bodies):
+            raise InvalidInputError(
+                f"a scene must have the same bodies at all times, got others at {time:g}: make meshes "
+                "and materials once, and only what holds and heats them in the function of time"
+            )
+    return scene
+
+
 @dataclass(frozen=True, eq=False)
 class _Moment:
     """Temperatures at a time, and what the next step needs of the last one.
 
+    `state`: that of all fields, before the first step what is known of it;
     `inside`: rate at which the nodes of each subdomain of this rank store heat at its end, and what they
     stored in it, (2, n) each; `power`, `heat`, `total`: the same where it comes from, and since the start.
     """
 
     time: float
+    state: Any
     values: np.ndarray
     inside: tuple[np.ndarray, ...]
     power: HeatBalance
@@ -70,35 +135,24 @@ class _Moment:
 class _Track:
     """One history; its factors stay while its steps do."""
 
-    state: HeatState
-    products = 0
-
-    def __init__(
-        self, problem: HeatProblem, at: Callable[[float], HeatScene], scheme: Weights, begin: int
-    ) -> None:
-        self.problem, self._at, self._scheme, self._begin = problem, at, scheme, begin
+    def __init__(self, march: March, scheme: Weights, begin: int) -> None:
+        self.march, self._scheme, self._begin = march, scheme, begin
         #: Error by the difference from twice as long steps; three and one times it if heat is smooth in time.
         self.doubt = 1.0 if sum(scheme(1.0, 1.0)[:2]) == 2.0 else 2.0  # is the rate of t² that of t = 1?
+        self.doubt = max(self.doubt, march.doubt)
 
     def after(self, last: _Moment, step: float, time: float) -> _Moment:
         """Return the end of a step. Collective."""
         a, b, c = (self._scheme if last.number >= self._begin else _theta(1.0))(step, last.step)
         history = tuple(c * rate + b * heat for rate, heat in last.inside)
-        with together(self.problem.comm), user_code("the scene as a function of time"):
-            scene = self._at(time)
-            if dict(scene.bodies) != dict(self.problem.scene.bodies):
-                raise InvalidInputError(
-                    f"a scene must have the same bodies at all times, got others at {time:g}: make meshes "
-                    "and materials once, and only what holds and heats them in the function of time"
-                )
-        self.state = state = self.problem.solve(scene, rate=Rate(a, last.values, history))
-        self.products += state.products
+        whole = self.march.end(last.state, time, step, Rate(a, last.values, history))
+        state: HeatState = whole.heat
         rates = zip(state.rates, history, strict=True)
         inside = tuple(np.stack([rate, (rate + known) / a]) for rate, known in rates)
         power = state.balance
         heat = HeatBalance.combined((1.0 / a, power), (c / a, last.power), (b / a, last.heat))
         total = HeatBalance.combined((1.0, last.total), (1.0, heat))
-        return _Moment(time, state.values, inside, power, heat, total, last.number + 1, step)
+        return _Moment(time, whole, state.values, inside, power, heat, total, last.number + 1, step)
 
 
 class _Steps:
@@ -112,17 +166,18 @@ class _Steps:
     greedy, aim = 0.2, 0.4
     #: By which factors steps become shorter or longer, and by which not. Shortest one, by the duration.
     shorter, longer, worth, least = 0.1, 1.5, 1.2, 1e-9
+    #: Part of a step that did not converge.
+    failing = 0.25
 
-    def __init__(
-        self, tracks: Sequence[_Track], values: np.ndarray, duration: float, step: float, tolerance: float
-    ) -> None:
+    def __init__(self, tracks: Sequence[_Track], first: Any, values: np.ndarray, course: Course) -> None:
         self.track, *self._others = tracks
-        self._duration, self._most, self._tolerance = duration, step, tolerance
-        inside = tuple(np.zeros((2, len(each))) for each in self.track.problem.no_rate.history)
+        duration, step = course.duration, course.step
+        self._duration, self._most, self._tolerance = duration, step, course.tolerance
+        inside = tuple(np.zeros((2, len(each))) for each in self.track.march.problem.no_rate.history)
         none = HeatBalance({}, 0.0)
-        self._coarse = self.moment = _Moment(0.0, values, inside, none, none, none)
+        self._coarse = self.moment = _Moment(0.0, first, values, inside, none, none, none)
         self._next, self.error = (min(1e-3 * duration, step), 0.0) if self._others else (step, nan)
-        self._step, self._differs, self.rejected = inf, 0.0, 0
+        self._step, self._differs, self.rejected, self._failure = inf, 0.0, 0, ""
 
     def to(self, end: float) -> Iterator[_Moment]:
         """Go on to a time, step by step. Collective."""
@@ -146,13 +201,18 @@ class _Steps:
         if step < self.least * self._duration:
             raise ConvergenceError(
                 f"steps must be longer than {step:.2g}, at {start:.6g} shorter ones err too much: loosen the "
-                "tolerance, or give the times at which loads jump as outputs"
+                f"tolerance, or give the times at which loads jump as outputs{self._failure}"
             )
-        coarse = self._others[0].after(self._coarse, step, time)
-        half = self.track.after(self.moment, 0.5 * step, start + 0.5 * step)
-        fine, last = self.track.after(half, 0.5 * step, time), self._differs
+        try:
+            coarse = self._others[0].after(self._coarse, step, time)
+            half = self.track.after(self.moment, 0.5 * step, start + 0.5 * step)
+            fine, last = self.track.after(half, 0.5 * step, time), self._differs
+        except ConvergenceError as failure:
+            self._failure, self._next = f"; the last step failed, {failure}", self.failing * step
+            return False
         own = self.track.doubt * float(np.abs(fine.values - coarse.values).max())
-        error, share = max(self.track.problem.comm.allgather(own)), min(step / (self._duration - start), 1.0)
+        error = max(self.track.march.problem.comm.allgather(own))
+        share = min(step / (self._duration - start), 1.0)
         allowed = max(self.greedy * (0.5 * self._tolerance - last), share * (self._tolerance - last))
         used = max((error - last) / allowed, 1e-10)
         factor = float(np.clip((self.aim / used) ** 0.5, self.shorter, self.longer))
@@ -166,7 +226,7 @@ class _Steps:
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class HeatHistory:
+class HeatHistory(Generic[Known]):
     """Temperatures over time, replicated on all ranks.
 
     Attributes:
@@ -174,18 +234,18 @@ class HeatHistory:
         values: Temperatures of the nodes of all bodies, body after body, at these times, (n, n_nodes).
         errors: Estimated error by steps at each time, the largest of all nodes, (n,), [degree]; not a number
             where steps have one length.
-        states: The states at the outputs and at the end.
+        states: At the outputs and at the end, each a `HeatState`, or a `HeatedState` of both fields.
         balance: As in a `HeatState`, but of all the time, [energy]: powers by the quadrature of the scheme.
         error: Largest estimated error by steps at any time, [degree].
         steps: Number of steps; with a tolerance two between two times.
         rejected: How often two steps erred too much and were done again, shorter.
-        products: Applications of dual operators.
+        products: Applications of dual operators of heat.
     """
 
     times: np.ndarray
     values: np.ndarray
     errors: np.ndarray
-    states: tuple[HeatState, ...]
+    states: tuple[Known, ...]
     balance: HeatBalance
     error: float
     steps: int
@@ -194,7 +254,7 @@ class HeatHistory:
 
     def temperature(self, body: str) -> np.ndarray:
         """Return the temperatures at the nodes of a body at all times, (n, n_nodes of the body)."""
-        state = self.states[-1]
+        state: HeatState = self.states[-1].heat
         first = state.torn.decomposition.tearing.first_of(body)
         return self.values[:, first : first + len(state.temperature[body])]
 
@@ -219,7 +279,7 @@ def heat_in_time(
     begin: int = 1,
     outputs: Sequence[float] = (),
     partitions: Mapping[str, np.ndarray] | None = None,
-) -> HeatHistory:
+) -> HeatHistory[HeatState]:
     """Compute temperatures over time. Collective on ``comm``.
 
     With a tolerance two histories go on side by side, one with steps half as long, which is the result. The
@@ -249,44 +309,59 @@ def heat_in_time(
         >>> history = heat_in_time(scene, MPI.COMM_WORLD, 60.0, 20.0, tolerance=0.1)  # doctest: +SKIP
         >>> history.temperature("plate").max(axis=1)  # doctest: +SKIP
     """
-    check_positive("duration", duration, "give the end of the history")
-    check_positive("step or tolerance", min(step, tolerance), "give the length of steps, or their error")
-    if begin < 1 or not all(0.0 < time <= duration for time in outputs):
-        needed = f"begin must be at least 1 and outputs lie above 0 and up to {duration:g}"
-        raise InvalidInputError(f"{needed}, got {begin} and {tuple(outputs)}: correct them")
-    at, weights = scene if callable(scene) else lambda time: scene, _scheme(scheme)
+    at = always(scene)
     with together(comm):
         with user_code("the scene as a function of time"):
             first = at(0.0)
-        values = _at_start(first, initial)
+        values = at_start(first, initial)
     warn_of(odd_values(first), comm)
-    problems = [HeatProblem(first, comm, partitions=partitions) for _ in range(1 + isfinite(tolerance))]
-    tracks = [_Track(problem, at, weights, begin) for problem in problems]
-    steps = _Steps(tracks, values, duration, step, tolerance)
-    return _history(steps, tracks, sorted({*outputs, duration}), every=len(outputs) == 0)
+
+    def march() -> March:
+        return _HeatAlone(HeatProblem(first, comm, partitions=partitions), at)
+
+    return march_on(march, None, values, Course(duration, step, tolerance, scheme, begin, outputs))
 
 
-def _history(steps: _Steps, tracks: Sequence[_Track], ends: Sequence[float], *, every: bool) -> HeatHistory:
+def always(given: Any) -> Callable[[float], Any]:
+    """Return what is given, a function of time or the same at all times, as a function."""
+    return given if callable(given) else lambda time: given
+
+
+def march_on(march: Callable[[], March], first: Any, values: np.ndarray, course: Course) -> HeatHistory[Any]:
+    """Return the history that begins with temperatures, (n_nodes,). Collective.
+
+    `march`: makes one of its own for each of the histories side by side; `first`: what is known at the start.
+    """
+    weights, outputs = _scheme(course.scheme), course.outputs
+    tracks = [_Track(march(), weights, course.begin) for _ in range(1 + isfinite(course.tolerance))]
+    steps = _Steps(tracks, first, values, course)
+    return _history(steps, tracks, sorted({*outputs, course.duration}), every=len(outputs) == 0)
+
+
+def _history(
+    steps: _Steps, tracks: Sequence[_Track], ends: Sequence[float], *, every: bool
+) -> HeatHistory[Any]:
     """Return the history of all steps. Collective."""
-    last, watch, states = steps.moment, _Watch(tracks[0].problem.comm), list[HeatState]()
+    problems = [track.march.problem for track in tracks]
+    last, watch, states = steps.moment, _Watch(problems[0].comm), []
     kept, worst = [(0.0, last.values, steps.error)], steps.error
     with Task("heat in time") as task:
         for end in ends:
             for number, moment in enumerate(steps.to(end), last.number + 1):
-                watch.see(tracks[0].state.scene, last.values, moment.values)
+                watch.see(moment.state.heat.scene, last.values, moment.values)
                 last, worst = moment, max(worst, steps.error)
                 task.step(number, words=f"time {moment.time:.6g} of {ends[-1]:.6g}")
                 if every or moment.time == end:
                     kept.append((moment.time, moment.values, steps.error))
-            states.append(tracks[0].state)
+            states.append(last.state)
     times, values, errors = (np.array(each) for each in zip(*kept, strict=True))
     return HeatHistory(
         times, values, errors, tuple(states), last.total, worst, last.number,
-        steps.rejected, sum(track.products for track in tracks),
+        steps.rejected, sum(problem.products for problem in problems),
     )  # fmt: skip
 
 
-def _at_start(scene: HeatScene, given: Any) -> np.ndarray:
+def at_start(scene: HeatScene, given: Any) -> np.ndarray:
     """Return temperatures of the nodes of all bodies, (n_nodes,), if these can store heat."""
     found, given = [], getattr(given, "temperature", given)
     for name in given if isinstance(given, Mapping) else ():
@@ -310,7 +385,12 @@ def _at_start(scene: HeatScene, given: Any) -> np.ndarray:
 
 
 class _Watch:
-    """Warns once of temperatures that no body can have, and once of those that go up and down."""
+    """Warns once of temperatures that no body can have, and once of those that go up and down.
+
+    `unnoticed`: what rounding may change of temperatures near zero, [degree].
+    """
+
+    unnoticed = 1e-9
 
     def __init__(self, comm: MPI.Comm) -> None:
         self._log = _LOG.debug if comm.rank else _LOG.warning
@@ -321,7 +401,8 @@ class _Watch:
         known = np.array([last.min(), last.max(), *scene.levels])
         low, high = known.min(), known.max()
         sources = [*(each.value for each in scene.held), *(each.level for each in scene.loads)]
-        if all(not callable(each) and isfinite(each) for each in sources):
+        rubbed = any(each.friction.part > 0.0 for each in scene.contacts)
+        if not rubbed and all(not callable(each) and isfinite(each) for each in sources):
             words = (
                 "temperatures lie %.3g degrees beyond those held, around and before: steps are short for the "
                 "cells where temperatures jump (below h² c / (6 k) of linear cells of size h); give smaller "
@@ -339,6 +420,6 @@ class _Watch:
             self._warn(words, np.abs(self._changes).min(axis=0)[turns].max(initial=0.0), high - low)
 
     def _warn(self, words: str, degrees: float, scale: float, least: float = 0.01) -> None:
-        if degrees > least * scale and words not in self._warned:
+        if degrees > max(least * scale, self.unnoticed) and words not in self._warned:
             self._warned.add(words)
             safe_log(self._log, words, degrees)

@@ -37,6 +37,7 @@ from fenics_contact.heat import (
 )
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain, TemperatureDependentElasticity
 from fenics_contact.mesh.quadratic import quadratic
+from tests.heat.coupled_bodies import sliding
 from tests.heat.heated_bodies import ALPHA, CONDUCTIVITY, YOUNG, ends, film, rod, rubbed_rod
 
 #: Weights of its nodes in integrals along it.
@@ -235,23 +236,6 @@ def test_friction_heats_what_presses_harder_up_to_a_critical_speed():
     assert state.gain == pytest.approx(6.0 / 8.0, rel=1e-4)
     with pytest.raises(ConvergenceError, match=r"raise each other without end.*thermoelastic instability"):
         solve_heated(*rubbed_rod(20.0), MPI.COMM_SELF)
-
-
-def sliding(friction: FrictionHeat, law: Coulomb, *, other_way: bool = False) -> tuple[Scene, HeatScene]:
-    """Return a block that is pressed onto another one and pushed along it by 0.3."""
-    material = PlaneStrain(YOUNG, 0.3, thermal_expansion=1e-5)
-    bodies = {
-        "lower": Body(rectangle((0.0, 0.0), (3.0, 1.0), (9, 2)), material),
-        "upper": Body(rectangle((0.5, 1.0), (1.5, 2.0), (4, 3)), material),
-    }
-    sides = Surface("upper", "y0"), Surface("lower", "y1")
-    held = [Support("lower", "y0"), Support("upper", "y1", (0.3, -0.01))]
-    scene = Scene(bodies, held, contacts=[ContactPair(*sides, law, discretisation="node")])
-    cooled = [HeldTemperature("lower", "y0", 0.0), HeldTemperature("upper", "y1", 0.0)]
-    sides = sides[::-1] if other_way else sides
-    joint = ThermalContact(*sides, 50.0, friction=friction, discretisation="node")
-    steel = {name: Conductor(2.0, 1.0) for name in bodies}
-    return scene, HeatScene.on(scene, steel, held=cooled, contacts=[joint])
 
 
 @pytest.mark.parametrize("other_way", [False, True])
