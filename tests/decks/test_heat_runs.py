@@ -115,6 +115,11 @@ def test_a_static_step_has_the_temperatures_of_an_earlier_job(tmp_path: Path) ->
     assert moved == pytest.approx([4.0 * 1e-5 * 40.0, 4.0 * 1e-5 * 20.0], rel=1e-5)
 
 
+def test_mechanics_is_refused_when_a_deck_is_read(tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match=r"needs \*ELASTIC or \*HYPERELASTIC behind it"):
+        read_heat_deck(deck(tmp_path, BAR + UNCOUPLED))
+
+
 @pytest.mark.parametrize(
     ("card", "words"),
     [
