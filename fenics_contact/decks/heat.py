@@ -140,10 +140,8 @@ class HeatDeck:
             raise InvalidInputError(
                 f"{self.frame.name} has no step in which bodies move at known temperatures: add *STATIC"
             )
-        found = {
-            cards.number: self._by_number(state.temperature)
-            for (cards, _), state in zip(self.steps, states, strict=True)
-        }
+        pairs = zip(self.steps, states, strict=True)
+        found = {cards.number: self._by_number(state.temperature) for (cards, _), state in pairs}
         return deck_of(self.frame.name, list(statics_of(self._cards, found, {})), Record())
 
     @cached_property
@@ -165,8 +163,7 @@ class HeatDeck:
 
     def _by_number(self, temperature: Mapping[str, np.ndarray]) -> Temperatures:
         """Return numbers of nodes and their temperatures."""
-        nodes = self.frame.node_numbers.items()
-        own = [(numbers[numbers > 0], temperature[body][numbers > 0]) for body, numbers in nodes]
+        own = [(n[n > 0], temperature[body][n > 0]) for body, n in self.frame.node_numbers.items()]
         numbers, values = (np.concatenate(each) for each in zip(*own, strict=True))
         return numbers, values
 
@@ -211,6 +208,8 @@ def _read(path: Path) -> HeatDeck:
         if card.name == "EQUATION" and any(len(row) > 1 and row[1] == "11" for row in card.rows):
             raise card.error("equations of temperatures are not solved: join bodies by *TIE")
     steps = heat_steps(cards, deck.mesh)
+    for card in [card for card in cards if card.name == "STATIC"][: steps[0].number if steps else 0]:
+        deck.note(card, "is before heat is computed: NT of this step is not written")
     heated = [each.at.elements for step in steps for each in step.acting if each.at.sides[0] == Whole.VOLUME]
     sets = [(f"DFLUX {k}", elements) for k, elements in enumerate(heated, start=1)]
     mesh, sections, of_element, parts = split_sections(

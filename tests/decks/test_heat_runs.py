@@ -59,7 +59,9 @@ def test_a_run_goes_through_steps_of_heat_and_of_statics_in_time(
 ) -> None:
     steps = f"*STEP\n*STATIC\n{CLAMPED}*END STEP\n" + steady(WARM) + "*STEP\n*STATIC\n*END STEP\n"
     assert run(deck(tmp_path, EXPANDS + steps.replace("*END STEP\n", ASKED))) == 0
-    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("step ")]
+    printed = capsys.readouterr().out.splitlines()
+    assert sum("is before heat is computed: NT of this step is not written" in line for line in printed) == 1
+    lines = [line for line in printed if line.startswith("step ")]
     assert [line[:14] for line in lines] == [
         "step 1, time 1",
         "step 2, time 2",
