@@ -234,10 +234,10 @@ def subdomain_fields(
             continue
         # Systems of several geometries share the meshes: another one may have moved them in the meantime.
         points = torn.scene.bodies[mesh.body].mesh.points
-        _dolfinx.update_coordinates(mesh.space.mesh, points[np.sort(mesh.nodes)])
+        _dolfinx.update_coordinates(mesh.space.mesh, mesh.by_input_node(points[mesh.nodes]))
         functions = []
         for index, field in enumerate(fields):
             function = _dolfinx.fem.Function(mesh.space, name=f"field{index}")
-            function.x.array[:] = field[start : start + mesh.size]
+            function.x.array[:] = mesh.on_space(field[start : start + mesh.size])
             functions.append(function)
         yield subdomain, functions

@@ -14,7 +14,7 @@ from fenics_contact._scene.fields import gradients_of
 from fenics_contact._scene.load_part import SurfaceLoad
 from fenics_contact._scene.loads import Load, PointForce, ThermalStrain, TotalForce
 from fenics_contact._surfaces.facets import GaussPoint, gauss_points, surface_moments
-from fenics_contact.design.forms import Moving, ShapeForms, sets_in_use, sum_over_subdomains
+from fenics_contact.design.forms import Moving, ShapeForms, sets_in_use, subdomain_fields, sum_over_subdomains
 from fenics_contact.design.surface_derivatives import integral_pulled_back
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_mean_at
@@ -233,22 +233,18 @@ def thermal_work_by_temperature(
     body, comm = torn.scene.bodies[load.body], torn.decomposition.comm
     for materials in sets_in_use(torn, load.body):
         forms.load_by_field(load, materials, body.element)
-    total, start = np.zeros(body.mesh.n_nodes), 0
+    total = np.zeros(body.mesh.n_nodes)
     with together(comm):
-        for mesh, parts in ((each.mesh, each.material) for each in torn.subdomains):
-            own, start = w[start : start + mesh.size], start + mesh.size
+        for subdomain, along in subdomain_fields(torn, [w]):
+            mesh, parts = subdomain.mesh, subdomain.material
             if mesh.body != load.body:
                 continue
-            points = mesh.by_input_node(body.mesh.points[mesh.nodes])
-            _dolfinx.update_coordinates(mesh.space.mesh, points)
-            along = _dolfinx.fem.Function(mesh.space, name="along")
-            along.x.array[:] = mesh.on_space(own)
-            (field,) = load_fields(load, mesh.space, points)
+            (field,) = load_fields(load, mesh.space, mesh.by_input_node(body.mesh.points[mesh.nodes]))
             template = forms.load_by_field(load, parts.materials, body.element)
             cells, values = loaded_cells(load, parts, body, mesh.cells), load_parameters(load, parts)
-            form = template.bind([field.function_space], values, [along, field], cells=cells)
+            form = template.bind([field.function_space], values, [*along, field], cells=cells)
             inputs, dofs = _dolfinx.node_dofs(field.function_space)
-            by_input = np.zeros(len(points))
+            by_input = np.zeros(len(inputs))
             by_input[inputs] = _dolfinx.assemble_vector(form)[dofs]
             total[mesh.nodes] += mesh.from_input_node(by_input)
     return np.asarray(comm.allreduce(total))

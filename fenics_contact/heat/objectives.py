@@ -204,6 +204,7 @@ class AtTemperatures:
             ends = at + step, np.maximum(at - step, 0.0)
             ahead, behind = (laws(replace(known, **{name: end})) for end in ends)
             found[name] = (ahead - behind) / (ends[0] - ends[1])
+        found["gap"] *= self.given.gap > -1e-9 * sizes["gap"]  # deeper ones are none for the laws
         return found
 
     def _by_friction(self, weight: np.ndarray) -> np.ndarray:

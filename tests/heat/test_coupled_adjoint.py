@@ -197,6 +197,20 @@ def test_derivatives_by_gaps_that_displacements_leave():
 
 
 @pytest.mark.claim
+@pytest.mark.parametrize("clearance", [0.08, 0.03])
+def test_derivatives_of_one_body_that_a_pair_does_not_stop(clearance: float):
+    # It was solved directly; with the smaller clearance it overlaps the wall, where gaps count as none.
+    def make(p: np.ndarray) -> Scenes:
+        scene, heat = rod(film(1.0, 0.01), p[0], 0.0, p[1])
+        return replace(scene, contacts=[]), heat
+
+    goals = [TemperatureMean("rod", "x1"), Movement("rod", "x1", (1.0, 0.0))]
+    check(make, np.array([80.0, clearance]), goals, [0, 1], step=1e-4)
+    gap = solved(make(np.array([80.0, clearance]))).adjoining()[1].gives.gap
+    assert np.all(gap < 0.0) == (clearance < 0.05)
+
+
+@pytest.mark.claim
 def test_derivatives_of_a_shrink_fit_that_heats():
     goals = [TemperatureMean("shaft"), HeatOfContact(0), JointResistance(0), LargestPressure(0)]
     check(shrink_fit, RING, goals, step=5e-4)
