@@ -32,7 +32,7 @@ from fenics_contact.heat.objectives import (
     NoMechanics,
     OfMechanics,
     followed,
-)
+)  # fmt: skip
 from fenics_contact.heat.state import HeatState
 from fenics_contact.qp.face_newton import ProjectedCG
 from fenics_contact.results.dual_solve import solve_dual
@@ -81,6 +81,8 @@ class HeatAdjoint:
     def gradient(self, scenes: Callable[[np.ndarray], Any], at: np.ndarray, step: float = 1e-5) -> np.ndarray:
         """Return dJ/dp by variables on which the scene depends, (n,). Collective; nothing is solved.
 
+        Each costs two assemblies, and of a `HeatedState` two factorisations where stiffness depends on it.
+
         Args:
             scenes: The `HeatScene` of variables, (n,): any numbers, functions, laws, materials, and places of
                 the nodes of the same cells; of a `HeatedState` the pair of `Scene` and `HeatScene`.
@@ -90,7 +92,9 @@ class HeatAdjoint:
         at = np.asarray(at, dtype=float)
         steps = np.diag(step * np.where(at == 0.0, 1.0, np.abs(at)))
         ends = [[self._varied(scenes(at + sign * change)) for sign in (1.0, -1.0)] for change in steps]
-        return np.array([ahead - behind for ahead, behind in ends]) / (2.0 * np.diag(steps))
+        changes = np.array([ahead - behind for ahead, behind in ends])
+        # Ranks must take the same decisions, whatever the rounding in sums over ranks.
+        return np.asarray(self.state.comm.bcast(changes / (2.0 * np.diag(steps))))
 
     def _varied(self, scenes: Any) -> float:
         """Return J − wᵀ R − ζᵀ B T of what a user makes of variables. Collective."""
@@ -143,8 +147,8 @@ def heat_adjoint(
     systems, anderson, linear = _Systems(warm), Anderson(depth=most), warm.scene.is_linear
     at = AtTemperatures.of(warm.scene, warm.torn.decomposition, warm.values, mechanics)
     at.mechanics.check(at, warm, quantity)
-    value, wanted, mechanics = quantity.value(at), quantity.partials(at)[0], at.mechanics
-    w = np.zeros_like(wanted)
+    value, wanted = state.comm.bcast(quantity.value(at)), quantity.partials(at)[0]
+    w, mechanics = np.zeros_like(wanted), at.mechanics
     for count in range(1, most + 1):
         mechanics = mechanics.following(at, quantity, w)
         right = wanted + mechanics.by_temperature
