@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         HeatFlux,
         HeatSource,
         HeldTemperature,
+        PlasticHeat,
         Radiation,
     )
     from fenics_contact.heat.plan import HeatPlan
@@ -69,6 +70,7 @@ __all__ = [
     "HeatedState",
     "HeldTemperature",
     "JointResistance",
+    "PlasticHeat",
     "PressureConductance",
     "Radiation",
     "TemperatureMean",

@@ -31,7 +31,7 @@ from fenics_contact.heat.assembly import Rate
 from fenics_contact.heat.fields import BothOnBodies
 from fenics_contact.heat.interaction import Interaction, check_fit
 from fenics_contact.heat.plausible import odd_power, warn_of
-from fenics_contact.heat.problem import GivenContact, HeatProblem, as_given
+from fenics_contact.heat.problem import HeatProblem, as_given
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.heat.state import HeatState
 from fenics_contact.qp.krylov import gmres
@@ -94,11 +94,12 @@ class Passes:
         `early`: passes after which Newton's method takes over, unless changes grow; earlier where they turn.
         """
         if not self.interaction.mechanics_heats:
-            heat = self._heat(as_given(self.interaction.joints))
+            given = as_given(self.interaction.joints)
+            heat = self.problems[1].solve(self.interaction.heat, rate=self.rate, given=given)
             return self._answer(self._mechanics(heat.values), heat)
         if not (self.interaction.expanding or self.interaction.rubbing):
             state = self._mechanics(guess)
-            return self._answer(state, self._heat(self.interaction.given(state)))
+            return self._answer(state, self._heat_after(state))
         anderson = Anderson()
         for count in range(1, most + 1):
             change = self._pass(guess)
@@ -128,7 +129,7 @@ class Passes:
     def _pass(self, guess: np.ndarray) -> np.ndarray:
         """Return by how much temperatures change in a pass; it is an answer if that is little. Collective."""
         state = self._mechanics(guess)
-        heat = self._heat(self.interaction.given(state))
+        heat = self._heat_after(state)
         change = heat.values - guess
         if self.known:
             way, turn = guess - self.known[-1][0], change - self.known[-1][1]
@@ -217,8 +218,9 @@ class Passes:
             step = LoadStep("heated", time=duration + (0.0 if before is None else before.time))
         return self.problems[0].solve(self.interaction.heated(temperature), before=before, step=step)
 
-    def _heat(self, given: GivenContact) -> HeatState:
-        return self.problems[1].solve(self.interaction.heat, rate=self.rate, given=given)
+    def _heat_after(self, state: AnyState) -> HeatState:
+        given, heat = self.interaction.given(state), self.interaction.worked(self.before, state)
+        return self.problems[1].solve(heat, rate=self.rate, given=given)
 
 
 def by_body(given: float | Mapping[str, float], heat: HeatScene) -> Mapping[str, float]:

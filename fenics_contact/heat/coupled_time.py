@@ -43,8 +43,10 @@ class _Both:
 
     @property
     def doubt(self) -> float:
-        """Friction forces heat by the mean of their work in a step, of the first order."""
-        return 2.0 if any(each.friction.part > 0.0 for each in self.problem.scene.contacts) else 1.0
+        """Friction and plastic flow heat by the mean of their work in a step, of the first order."""
+        scene = self.problem.scene
+        works = [*(each.friction.part > 0.0 for each in scene.contacts)]
+        return 2.0 if any([*works, *(each.by_mechanics for each in scene.loads)]) else 1.0
 
     def end(self, last: Any, time: float, step: float, rate: Rate) -> HeatedState:
         problems, comm = (self.mechanics, self.problem), self.problem.comm
@@ -91,7 +93,8 @@ def heated_in_time(
         stress_free: As for `solve_heated`.
         step: Length of steps, [time]; with a tolerance, of the longest.
         tolerance: Largest error of temperatures by steps, [degree].
-        scheme: As for `heat_in_time`. Work of friction forces is the mean of a step, of the first order.
+        scheme: As for `heat_in_time`. Work of friction forces and plastic work are the mean of a step, of
+            the first order, and balanced with mechanics by Euler steps.
         begin: Number of Euler steps at the start.
         outputs: Times at which steps end, as where loads jump; what is kept is that at these and at the end.
         partitions: As for `solve_scene`.

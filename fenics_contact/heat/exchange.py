@@ -28,6 +28,9 @@ class Place(Protocol):
     def share(self, nodes: str) -> np.ndarray:
         """Return its share in each of some nodes, zero at others, (n,)."""
 
+    def own(self, values: float | np.ndarray) -> np.ndarray:
+        """Return its share of values at the nodes of its body, (n_nodes,), as (n,)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Exchange:

@@ -240,6 +240,11 @@ class Part:
         here = np.isin(self.mesh.nodes, self.body.mesh.nodes_of(nodes))
         return np.where(here, self.portion, 0.0)
 
+    def own(self, values: float | np.ndarray) -> np.ndarray:
+        """Return its share of values at the nodes of its body, (n_nodes,), as (n,)."""
+        every = np.broadcast_to(values, self.body.mesh.n_nodes)
+        return np.asarray(self.portion * every[self.mesh.nodes])
+
     @cached_property
     def portion(self) -> np.ndarray:
         """Its portion of what enters at each node: that of its cells among those there, shape (n,)."""

@@ -22,9 +22,11 @@ from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.decomposition import Tearing
 from fenics_contact.heat.friction import FrictionHeat
 from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.plastic import plastic_work
 from fenics_contact.heat.problem import GivenContact, as_given
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.materials.elastic import can_expand
+from fenics_contact.materials.plastic import has_history
 from fenics_contact.results.contact import Status
 from fenics_contact.results.deformed_state import AnyState
 
@@ -56,6 +58,7 @@ class Interaction:
     def mechanics_heats(self) -> bool:
         """Whether temperatures depend on mechanics."""
         heats = any(law.part > 0.0 for law in self.laws.values())
+        heats = heats or any(load.by_mechanics for load in self.heat.loads)
         return heats or any(each.law.by_contact for each in self.heat.contacts)
 
     @property
@@ -124,6 +127,16 @@ class Interaction:
             work[mine] = w * (total / (w @ self.joints.area[mine])) if w.any() else w
         return GivenContact(np.maximum(pressure, 0.0), gap, np.maximum(work, 0.0))
 
+    def worked(self, before: AnyState | None, state: AnyState) -> HeatScene:
+        """Return the heat with that of plastic work from a state before. Collective."""
+
+        def power(body: str) -> np.ndarray:
+            return plastic_work(before, state, body) * (self.heat.bodies[body].thickness / self.duration)
+
+        loads = [load.worked(power) for load in self.heat.loads]
+        same = all(one is other for one, other in zip(loads, self.heat.loads, strict=True))
+        return self.heat if same else replace(self.heat, loads=loads)
+
     def nodes_in(self, state: AnyState) -> np.ndarray:
         """Return the numbers that the nodes of the heat have in a state of mechanics."""
         tearing, bodies = state.torn.decomposition.tearing, self.heat.bodies
@@ -162,6 +175,13 @@ class Interaction:
 
 def check_fit(scene: Scene, heat: HeatScene, given: Mapping[str, float]) -> None:
     """Reject fields on different bodies or meshes, and materials that are free of stress elsewhere."""
+    for load in heat.loads:
+        plastic = load.body not in scene.bodies or any(map(has_history, scene.bodies[load.body].materials))
+        if load.by_mechanics and not plastic:
+            raise InvalidInputError(
+                f"PlasticHeat needs a material of body {load.body!r} that flows, got none: give one, such as "
+                "J2Plasticity"
+            )
     for name, body in heat.bodies.items():
         check_known(name, scene.bodies, f"heat is of body {name!r}, the mechanics has")
         check_known(name, given, f"stress_free needs a temperature of body {name!r}, it has")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from math import inf, nan
-from typing import Any, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 
@@ -49,6 +49,12 @@ class HeatPart(ABC):
     level: Value = nan
     # Temperatures must lie above it.
     absolute_zero: float = -inf
+    #: Whether mechanics gives its heat.
+    by_mechanics = False
+
+    def worked(self, power: Callable[[str], np.ndarray]) -> Self:
+        """Return it with the power of plastic work, at the nodes of a body by its name."""
+        return self
 
     def check(self, meshes: Mapping[str, BodyMesh]) -> None:
         """Reject a body or a place that is not there."""
@@ -235,6 +241,52 @@ class HeatAtNodes(HeatPart):
         return given(self.value * on.share(self.nodes))
 
 
+@dataclass(frozen=True, eq=False)
+class PlasticHeat(HeatPart):
+    """Heat of plastic work, of the mean power in each step of time, see `solve_heated` and `heated_in_time`.
+
+    Steady states have none.
+
+    Attributes:
+        body: Name of the body.
+        share: Part of the work that becomes heat, in [0, 1]; metals give 0.8 to 1 (G. I. Taylor, H. Quinney,
+            Proc. R. Soc. A 143 (1934) 307-326).
+        power: Plastic work in time at the nodes of the body, (n_nodes,), which mechanics gives, [power].
+    """
+
+    body: str
+    share: float = 0.9
+    power: float | np.ndarray = field(default=nan, repr=False)
+
+    by_mechanics = True
+
+    def __post_init__(self) -> None:
+        """Reject a share of more than all."""
+        if not 0.0 <= self.share <= 1.0:
+            raise InvalidInputError(
+                f"PlasticHeat.share must lie between 0 and 1, got {self.share!r}: it is a part of the work"
+            )
+
+    def worked(self, power: Callable[[str], np.ndarray]) -> Self:
+        """Return it with the power at the nodes of its body."""
+        return replace(self, power=power(self.body))
+
+    def _check_place(self, kind: str, mesh: BodyMesh) -> None:
+        """It is in all of the body."""
+
+    @property
+    def place(self) -> str:
+        """Where it is, in words."""
+        return self.body
+
+    def exchange(self, on: Place, temperature: np.ndarray) -> Exchange:
+        """Return what it gives to a subdomain."""
+        if not np.isfinite(self.power).all():
+            words = f"PlasticHeat of body {self.body!r} needs the work of mechanics, got heat alone"
+            raise InvalidInputError(f"{words}: take heated_in_time, or leave it out")
+        return given(self.share * on.own(self.power))
+
+
 class Film(OnSurface):
     """What a surface exchanges with surroundings of a known temperature."""
 
@@ -392,4 +444,4 @@ class Radiation(Film):
 
 
 #: What heats and cools bodies.
-HeatLoad: TypeAlias = HeatFlux | HeatSource | HeatAtNodes | Convection | Radiation
+HeatLoad: TypeAlias = HeatFlux | HeatSource | HeatAtNodes | PlasticHeat | Convection | Radiation

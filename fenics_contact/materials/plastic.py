@@ -147,6 +147,13 @@ class HistoryMaterial(Expanding):
         """Return the accumulated equivalent plastic strain, shape (n,): zeros unless a model has one."""
         return np.zeros(len(history))
 
+    def plastic_work(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Return the work per undeformed volume that is lost between histories, (n, k), shape (n,)."""
+        raise InvalidInputError(
+            f"heat of plastic work needs what {type(self).__name__} loses in a step, got no plastic_work: "
+            "define it, or leave out PlasticHeat"
+        )
+
     def admissible(self, history: np.ndarray) -> np.ndarray:
         """Return internal variables that points may have, near means of those of several points, (n, k).
 
@@ -308,6 +315,11 @@ class VonMisesMetal(HistoryMaterial):
     def equivalent_plastic_strain(self, history: np.ndarray) -> np.ndarray:
         """Return the accumulated equivalent plastic strain, shape (n,)."""
         return history[:, 6]
+
+    def plastic_work(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Return ∫ σ_y dα by the trapezoidal rule, (n,); what back stresses take is stored, not lost."""
+        low, high = (self.hardening.at(each[:, 6])[0] for each in (before, after))
+        return np.asarray(0.5 * (low + high) * (after[:, 6] - before[:, 6]))
 
 
 @dataclass(frozen=True)

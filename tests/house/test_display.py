@@ -138,6 +138,7 @@ from fenics_contact.heat import (
     HeatSource,
     HeldTemperature,
     JointResistance,
+    PlasticHeat,
     PressureConductance,
     Radiation,
     TemperatureMean,
@@ -318,7 +319,7 @@ def heated(contact: ContactProblem, state: AnyState) -> list[Any]:
         FrictionHeat(0.3, lambda x: x[:, 0]), Radiation("a", "z0", 0.9, 300.0),
         Convection("a", "z0", TemperatureTable((0.0, 1.0), (1.0, 2.0)), 20.0), HeatSource("a", 1.0),
         HeatAtNodes("a", "z0", 1.0), heat_adjoint(warm, TemperatureMean("plate 0")),
-        heat_goal_error(warm, TemperatureMean("plate 0")),
+        heat_goal_error(warm, TemperatureMean("plate 0")), PlasticHeat("a", 0.9, np.ones(99)),
         HeatOfContact(0), HeatOfHeld("plate 0", "z0"), JointResistance(0),
     ]  # fmt: skip
 
