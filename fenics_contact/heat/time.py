@@ -238,7 +238,7 @@ class HeatHistory(Generic[Known]):
         balance: As in a `HeatState`, but of all the time, [energy]: powers by the quadrature of the scheme.
         error: Largest estimated error by steps at any time, [degree].
         steps: Number of steps; with a tolerance two between two times.
-        rejected: How often two steps erred too much and were done again, shorter.
+        rejected: How often two steps erred too much, or did not converge, and were done again, shorter.
         products: Applications of dual operators of heat.
     """
 

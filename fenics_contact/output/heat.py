@@ -12,12 +12,15 @@ from fenics_contact.output.files import write_text
 from fenics_contact.output.tables import csv_text
 
 if TYPE_CHECKING:
+    from fenics_contact.heat.coupled import HeatedState
     from fenics_contact.heat.state import HeatState
 
 
 @collectively("write_heat_balance", lambda states, *_, **__: states[0].comm)
 @naming_arguments
-def write_heat_balance(states: Sequence[HeatState], path: str | Path, times: Sequence[float] = ()) -> Path:
+def write_heat_balance(
+    states: Sequence[HeatState | HeatedState], path: str | Path, times: Sequence[float] = ()
+) -> Path:
     """Write temperatures and where heat comes from as a table (CSV), a row a state. Collective.
 
     After a remark a line names the columns: ``time``; of each body ``BODY least`` and ``BODY largest``, its
@@ -25,7 +28,7 @@ def write_heat_balance(states: Sequence[HeatState], path: str | Path, times: Seq
     `HeatBalance.by_part`, positive where heat enters; ``stored``; ``error`` of the balance, relative.
 
     Args:
-        states: At least one, such as those of a `HeatHistory`.
+        states: At least one, such as those of a `HeatHistory`, alone or with mechanics.
         path: File to write; its folder is created.
         times: Of each; by default 0, 1, ...
 
@@ -36,7 +39,7 @@ def write_heat_balance(states: Sequence[HeatState], path: str | Path, times: Seq
         >>> write_heat_balance([state], "output/balance.csv")  # doctest: +SKIP
     """
     rows: list[dict[str, Any]] = []
-    for time, state in zip(times or range(len(states)), states, strict=True):
+    for time, state in zip(times or range(len(states)), (each.heat for each in states), strict=True):
         row: dict[str, Any] = {"time": float(time)}
         for body, own in state.temperature.items():
             row |= {f"{body} least": own.min(), f"{body} largest": own.max()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from fenics_contact.heat import (
 from fenics_contact.heat.coupled import Passes
 from fenics_contact.materials import HistoryMaterial, J2Plasticity
 from fenics_contact.mesh.quadratic import quadratic
+from fenics_contact.output import write_heat_balance
 from tests.heat.coupled_bodies import CAPACITY, CLEARANCE, END, closing, ramp, sliding
 from tests.heat.heated_bodies import ALPHA, YOUNG, film, rod
 
@@ -114,7 +116,7 @@ def pushed(friction: FrictionHeat) -> tuple[Callable[[float], Scene], HeatScene]
     return at, heat
 
 
-def test_steps_carry_slips_and_heat_by_all_work_of_friction():
+def test_steps_carry_slips_and_heat_by_all_work_of_friction(tmp_path: Path):
     at, heat = pushed(FrictionHeat(part=0.8))
     times = [1.0, 1.5, 2.5, 4.0]
     history = heated_in_time(at, heat, MPI.COMM_SELF, 4.0, 0.0, step=1.5, scheme="euler", outputs=times)
@@ -127,6 +129,8 @@ def test_steps_carry_slips_and_heat_by_all_work_of_friction():
     assert np.abs(contacts[-1].slip).max() < 0.16
     assert history.balance.error < 1e-12
     assert history.times == pytest.approx([0.0, *times])
+    table = write_heat_balance(history.states, tmp_path / "balance.csv", times)
+    assert len(table.read_text().splitlines()) == 2 + len(times)
 
 
 @pytest.mark.claim
