@@ -91,7 +91,8 @@ class Passes:
     def run(self, guess: np.ndarray, early: int = 30, most: int = 80) -> HeatedState:
         """Return the state in which both agree. Collective.
 
-        `early`: passes after which Newton's method takes over, unless changes grow; earlier where they turn.
+        `early`: passes after which Newton's method takes over, unless changes grow or are small; earlier
+        where they turn.
         """
         if not self.interaction.mechanics_heats:
             given = as_given(self.interaction.joints)
@@ -105,9 +106,9 @@ class Passes:
             change = self._pass(guess)
             if self.answers:
                 return self.answers[0]
-            large = np.linalg.norm(change) > 1e-3 * np.linalg.norm(self.known[0][1])
-            turning = large and count == 10 and any(change @ r < 0.0 for _, r in self.known[-6:])
-            if turning or (count >= early and self.gain <= 1.0):
+            left = np.linalg.norm(change) / np.linalg.norm(self.known[0][1])
+            turning = left > 1e-3 and count == 10 and any(change @ r < 0.0 for _, r in self.known[-6:])
+            if turning or (count >= early and self.gain <= 1.0 and left > 1e-6):
                 return self._newton(guess, change)
             if self.gain > 1.0:  # follow what grows to where it grows no more
                 anderson, guess = Anderson(), guess + change
