@@ -99,6 +99,8 @@ _PLAIN: dict[Any, tuple[str, tuple[type, ...]]] = {
 def checked(*own: str) -> Callable[[Class], Class]:
     """Let a dataclass reject values whose types are not those of its fields, before its own checks.
 
+    Vectors, given as any sequence, become tuples.
+
     Place it below ``@dataclass``.
 
     Example:
@@ -122,6 +124,11 @@ def checked(*own: str) -> Callable[[Class], Class]:
 
         def __post_init__(self: Any) -> None:
             _check(self, cls, own)
+            # Arrays do not compare, and what is built from equal ones must be equal.
+            for name in _vectors(cls):
+                value = getattr(self, name)
+                given = value if type(value) is tuple else tuple(np.asarray(value).tolist())
+                object.__setattr__(self, name, given)
             further(self)
 
         __post_init__.__doc__ = further.__doc__
@@ -146,6 +153,12 @@ def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
             explanation = meaning(type(instance), field.name)
             given = f"{place} must be {_named(hint)}, got {reprlib.repr(value)}"
             raise InvalidInputError(f"{given}: {explanation}" if explanation else given)
+
+
+@cache
+def _vectors(cls: type) -> tuple[str, ...]:
+    """Return the fields that are vectors."""
+    return tuple(each.name for each in fields(cls) if _hints(cls).get(each.name) == GivenVector)
 
 
 @cache

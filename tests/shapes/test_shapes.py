@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -369,3 +370,19 @@ def test_a_tensor_grid_has_every_combination_and_its_last_coordinate_runs_fastes
     grid = tensor_grid([[0, 1], [5, 6, 7]])
     np.testing.assert_array_equal(grid, [[0, 5], [0, 6], [0, 7], [1, 5], [1, 6], [1, 7]])
     assert np.issubdtype(grid.dtype, np.integer), "counts stay whole numbers"
+
+
+@pytest.mark.parametrize(
+    ("kind", "more"),
+    [
+        (Plane, [(0.0, 0.0, 1.0)]),
+        (Sphere, [2.0]),
+        (Cylinder, [(0.0, 1.0, 0.0), 2.0]),
+        (Torus, [(0.0, 1.0, 0.0), 2.0, 0.5]),
+        (Box, [(1.0, 2.0, 3.0)]),
+    ],
+)
+def test_shapes_of_arrays_are_those_of_numbers(kind: Any, more: list[Any]) -> None:
+    given = kind(np.zeros(3), *(np.array(each) if isinstance(each, tuple) else each for each in more))
+    assert given == kind([0.0, 0.0, 0.0], *more) == kind((0, 0, 0), *more)
+    assert hash(given) == hash(kind((0, 0, 0), *more))
