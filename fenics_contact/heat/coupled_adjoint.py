@@ -91,7 +91,8 @@ class Mechanics(NoMechanics):
         problem = ContactProblem.following(state, solver=ProjectedCG())  # never directly, without multipliers
         multiplier = np.zeros_like(state.solution.multiplier)
         none = Adjoint(np.zeros_like(state.torn_displacement), multiplier, 0.0 * state.dual_solution.alpha, 0)
-        gives, face = interaction.given(state), linearise_face(state, WeakChoice.RELEASED)
+        face = linearise_face(state, WeakChoice.RELEASED)
+        gives = interaction.given(_on_face(state, face))
         return cls(
             interaction, problem, stored_state(state), state, face, ShapeForms.at_rest(state.torn),
             gives, gives, Partials.of(state, 0.0), none, np.zeros_like(values),
@@ -129,7 +130,7 @@ class Mechanics(NoMechanics):
             )
         interaction = replace(self.interaction, joints=joints)
         state: Any = self.problem.restore(self.stored, interaction.heated(values))
-        return replace(self, interaction=interaction, state=state)
+        return replace(self, interaction=interaction, state=_on_face(state, self.linearised))
 
     def given(self, joints: Joints) -> GivenContact:
         """Return what the state gives."""
@@ -212,3 +213,11 @@ class Mechanics(NoMechanics):
             np.add.at(by_mean, here, by_coefficient[mine] * slope_of(table.at, mean)[here])
         of_master = np.where(joints.on_obstacle, 0.0, by_mean)
         return 0.5 * np.asarray(joints.points.own.T @ by_mean + joints.points.master.T @ of_master)
+
+
+def _on_face(state: LinearState, linearised: LinearisedFace) -> LinearState:
+    """Return a state without forces at points that its face has open: they only just touch. Collective."""
+    torn, contact, closed = state.torn, state.contact, np.zeros(state.torn.layout.size)
+    closed[torn.layout.normal] = linearised.face.closed
+    force = contact.normal_force * torn.numbering.gather(closed, torn.normal_rows)
+    return replace(state, contact=replace(contact, normal_force=force))

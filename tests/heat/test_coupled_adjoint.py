@@ -165,17 +165,18 @@ def test_a_rod_that_only_just_touches_has_the_derivatives_of_one_side():
         values = [ends(1.0, 0.01, hot, 0.0, gap)[0] for hot, gap in (at + k * step for k in range(3))]
         return float((-3.0 * values[0] + 4.0 * values[1] - values[2]) / (2.0 * step.sum()))
 
-    state = solved(scenes(at))
+    state = solve_heated(*scenes(at), MPI.COMM_SELF, tolerance=1e-12, settled=1e-10)
     contact = state.mechanics.contact
-    assert np.abs(contact.gap).max() < 1e-11
-    assert contact.normal_force.max() < 1e-8
+    assert np.abs(contact.gap).max() < 1e-9
+    assert contact.normal_force.max() < 1e-6
     opening, closing = (
         [one_sided(np.array([-1e-3 * way, 0.0])), one_sided(np.array([0.0, 1e-6 * way]))] for way in (1, -1)
     )
     assert np.abs(np.array(closing) / opening - 1.0).min() > 1.0
     # Steps are longer than the way to the other side.
-    gradient = heat_adjoint(state, TemperatureMean("rod", "x1")).gradient(scenes, at)
-    assert gradient == pytest.approx(closing if contact.normal_force.any() else opening, rel=1e-5)
+    found = heat_adjoint(state, TemperatureMean("rod", "x1"))
+    closed = contact.normal_force.any() and not found.weak.contacts
+    assert found.gradient(scenes, at) == pytest.approx(closing if closed else opening, rel=1e-5)
 
 
 @pytest.mark.claim
