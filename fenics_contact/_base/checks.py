@@ -125,7 +125,7 @@ def checked(*own: str) -> Callable[[Class], Class]:
         def __post_init__(self: Any) -> None:
             _check(self, cls, own)
             # Arrays do not compare, and what is built from equal ones must be equal.
-            for name in _vectors(cls):
+            for name in _vectors(cls, own):
                 value = getattr(self, name)
                 given = value if type(value) is tuple else tuple(np.asarray(value).tolist())
                 object.__setattr__(self, name, given)
@@ -156,9 +156,10 @@ def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
 
 
 @cache
-def _vectors(cls: type) -> tuple[str, ...]:
-    """Return the fields that are vectors."""
-    return tuple(each.name for each in fields(cls) if _hints(cls).get(each.name) == GivenVector)
+def _vectors(cls: type, own: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the fields that are vectors, but for those that a class checks on its own."""
+    names = (each.name for each in fields(cls) if each.name not in own)
+    return tuple(name for name in names if _hints(cls).get(name) == GivenVector)
 
 
 @cache

@@ -22,7 +22,7 @@ import numpy as np
 
 from fenics_contact._base.display import displayed
 from fenics_contact.design.adjoint import WeakPoints
-from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively
+from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively, together
 from fenics_contact.feti.averages import nodal_mean_at, nodal_mean_transposed
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.heat.acceleration import Anderson
@@ -145,6 +145,8 @@ def heat_adjoint(
     quantity = objective if isinstance(objective, HeatObjective) else OfMechanics(objective)
     warm, mechanics, *_ = *state.adjoining(), NoMechanics()
     systems, anderson, linear = _Systems(warm), Anderson(depth=most), warm.scene.is_linear
+    with together(state.comm):
+        quantity.check(warm.scene)
     at = AtTemperatures.of(warm.scene, warm.torn.decomposition, warm.values, mechanics)
     at.mechanics.check(at, warm, quantity)
     value, wanted = state.comm.bcast(quantity.value(at)), quantity.partials(at)[0]

@@ -261,7 +261,7 @@ def solve_heated(
         before: State at the end of the step before, with the same bodies.
         duration: Time of the step, in which bodies store heat since ``before``, by Euler's rule of the first
             order, and friction forces times slips become heat; by default so long that a steady state is
-            reached, in which prescribed speeds alone heat.
+            reached, in which prescribed speeds alone heat. Without ``before`` nothing is stored.
         partitions: As for `solve_scene`.
         tolerance: Largest relative residual of mechanics; it bounds how steep films may be.
         settled: Largest change of temperatures in the last pass, relative to their range.

@@ -23,7 +23,7 @@ from fenics_contact._accuracy.discretisation import OfCells, Parts
 from fenics_contact._accuracy.recovery import find_sites, recovered_gradients
 from fenics_contact._adaptive.boundary_errors import towards_shapes
 from fenics_contact._adaptive.estimates import ErrorEstimate
-from fenics_contact.errors import collectively, together
+from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.subdomain import SubdomainMesh
 from fenics_contact.heat.adjoint import HeatAdjoint, heat_adjoint
 from fenics_contact.heat.contact_residuals import between_points
@@ -35,7 +35,7 @@ from fenics_contact.heat.state import HeatState
 from fenics_contact.mesh.cell_types import quadrature
 
 
-@collectively("heat_goal_error", lambda state, *_, **__: state.torn.decomposition.comm)
+@collectively("heat_goal_error", lambda state, *_, **__: state.comm)
 def heat_goal_error(state: HeatState, objective: HeatObjective, *, tolerance: float = 1e-9) -> ErrorEstimate:
     """Estimate the error of a quantity of steady temperatures by its adjoint. Collective.
 
@@ -56,21 +56,26 @@ def heat_goal_error(state: HeatState, objective: HeatObjective, *, tolerance: fl
         >>> print(error)  # doctest: +SKIP
         >>> cells = error.by_cell("chip")  # doctest: +SKIP
     """
+    if len(state.adjoining()) > 1:
+        raise InvalidInputError(
+            "errors are estimated of temperatures alone, got a state with mechanics, whose own error is not "
+            "known here: give the state of solve_heat"
+        )
     adjoint = heat_adjoint(state, objective, tolerance=tolerance)
     decomposition, value = state.torn.decomposition, adjoint.value
     comm, at = decomposition.comm, AtTemperatures.of(state.scene, decomposition, state.values)
     weight, balanced = adjoint.values - objective.partials(at)[2], adjoint.lagrangian(at)
-    found, own = _between_gradients(state, weight)
+    (found, own), between_nodes = _between_gradients(state, weight), objective.missing(at)
     between, apart = between_points(state, weight)
     geometry, curved = _by_geometry(adjoint, at, weight)
     own = {n: (cells, shares + (curved[n] + apart[n])[cells]) for n, (cells, shares) in own.items()}
     sums = np.array([found, *(float(shares.sum()) for _, shares in own.values())])
     sums = np.asarray(comm.allreduce(sums))
     sizes = {name: body.mesh.n_cells for name, body in state.scene.bodies.items()}
+    mesh, uncancelled = sums[0] + between + between_nodes, sums[1:].sum() + abs(between_nodes)
     return ErrorEstimate(
-        value, float(sums[0]) + between, float(sums[1:].sum()), geometry, balanced - value, "",
-        comm, sizes, own,
-    )  # fmt: skip
+        value, float(mesh), float(uncancelled), geometry, balanced - value, "", comm, sizes, own
+    )
 
 
 def _between_gradients(state: HeatState, weight: np.ndarray) -> tuple[float, OfCells]:

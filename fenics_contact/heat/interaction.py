@@ -80,13 +80,18 @@ class Interaction:
         }
         return [k for k, law in self.laws.items() if law.by_temperature and EffectName.COULOMB in acting[k]]
 
-    def strains(self, temperature: np.ndarray) -> list[ThermalStrain]:
-        """Return the loads of temperatures of all nodes, (n_nodes,)."""
-        loads = []
+    def strains(self, temperature: np.ndarray, least: float = 1e-10) -> list[ThermalStrain]:
+        """Return the loads of temperatures of all nodes, (n_nodes,).
+
+        `least`: changes of a body relative to temperatures that are what linear systems leave. Alone in a
+        scene they would be all that mechanics resolves.
+        """
+        loads, size = [], max(np.abs(temperature).max(), *map(abs, self.cold.values()))
         for name in self.expanding:
             points = self.scene.bodies[name].mesh.points
-            own = temperature[self.tearing.first_of(name) :][: len(points)]
-            loads.append(ThermalStrain(name, NodeValues(points, own - self.cold[name])))
+            change = temperature[self.tearing.first_of(name) :][: len(points)] - self.cold[name]
+            change *= np.abs(change).max() > least * size
+            loads.append(ThermalStrain(name, NodeValues(points, change)))
         return loads
 
     def heated(self, temperature: np.ndarray) -> Scene:
@@ -190,6 +195,14 @@ def check_fit(scene: Scene, heat: HeatScene, given: Mapping[str, float]) -> None
             raise InvalidInputError(
                 f"heat and mechanics need the same mesh of body {name!r}, got {len(points)} nodes for heat, "
                 f"{len(known)} for mechanics: take HeatScene.on(scene, ...)"
+            )
+        thick = np.unique(scene.bodies[name].thickness_of_cells).tolist()
+        alike = scene.bodies[name].axisymmetric == body.axisymmetric
+        if not alike or (thick != [body.thickness] and scene.bodies[name].has_thickness):
+            raise InvalidInputError(
+                f"heat and mechanics need body {name!r} of one thickness, and both of revolution or none, "
+                f"got {body.thickness:g} and {thick}, axisymmetric={body.axisymmetric} and "
+                f"{scene.bodies[name].axisymmetric}: take HeatScene.on(scene, ...)"
             )
         materials = scene.bodies[name].materials
         initial = {getattr(each, "initial_temperature", given[name]) for each in materials}

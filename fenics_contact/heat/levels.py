@@ -69,6 +69,7 @@ def solve_heat_to(
     """
     with together(comm):
         require_share(relative_error)
+        objective.check(scene)
     warn_of(odd_values(scene), comm)
     return _Levels(objective, relative_error, limits or Limits(), comm).follow(
         HeatProblem(scene, comm), callback

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fenics_contact._adaptive.contact_residuals import Places
 from fenics_contact._base.checks import checked
+from fenics_contact._scene.checks import check_known
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.parts import surface_of
 from fenics_contact.design.adjoint import WeakChoice, WeakPoints
 from fenics_contact.design.objective import Objective
 from fenics_contact.errors import InvalidInputError, together
@@ -20,9 +24,11 @@ from fenics_contact.heat.assembly import Assembly, Heated, Rate
 from fenics_contact.heat.conductance import Touch
 from fenics_contact.heat.forms import HeatForms, Part
 from fenics_contact.heat.joints import Joints
+from fenics_contact.heat.points_of_cells import PointsOfCells
 from fenics_contact.heat.problem import GivenContact, as_given
 from fenics_contact.heat.properties import slope_of
 from fenics_contact.heat.scene import HeatScene
+from fenics_contact.mesh.cell_types import quadrature
 
 if TYPE_CHECKING:
     from fenics_contact.heat.state import HeatState
@@ -273,6 +279,13 @@ class HeatObjective(ABC):
     def partials(self, at: AtTemperatures) -> HeatPartials:
         """Return the derivatives of J. Collective."""
 
+    def check(self, scene: HeatScene) -> None:
+        """Reject a scene without what it is a quantity of; nothing by default."""
+
+    def missing(self, at: AtTemperatures) -> float:
+        """Return what J misses of its integral with the temperatures of the mesh. Collective."""
+        return 0.0
+
     def size(self, value: float, temperatures: np.ndarray) -> float:
         """Return what errors of J are relative to, by default its size; `temperatures`: of all nodes."""
         return abs(value)
@@ -311,6 +324,21 @@ class TemperatureMean(HeatObjective):
     exponent: float = 1.0
     level: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Reject powers of which there is no mean."""
+        if not 1.0 <= self.exponent < np.inf:
+            raise InvalidInputError(
+                f"TemperatureMean.exponent must be at least 1 and finite, got {self.exponent:g}: 1 is the "
+                "mean, 20 is close to the highest temperature"
+            )
+
+    def check(self, scene: HeatScene) -> None:
+        """Reject a body or surface that is not there."""
+        check_known(self.body, scene.bodies, f"TemperatureMean names body {self.body!r}, the scene has")
+        if self.surface:
+            known = scene.bodies[self.body].mesh.surfaces
+            check_known(self.surface, known, f"TemperatureMean names surface {self.surface!r}, the body has")
+
     def value(self, at: AtTemperatures) -> float:
         """Return the mean."""
         weight, over = self._over(at)
@@ -325,6 +353,36 @@ class TemperatureMean(HeatObjective):
     def size(self, value: float, temperatures: np.ndarray) -> float:
         """Return the range of temperatures, whose zero may lie anywhere."""
         return float(np.ptp(temperatures))
+
+    def missing(self, at: AtTemperatures) -> float:
+        """Return what a sum over nodes misses of powers between them. Collective."""
+        if self.exponent == 1.0:
+            return 0.0
+        comm, value = at.decomposition.comm, self.value(at)
+        sizes, values = map(np.concatenate, zip(*self._between(at), strict=True))
+        powers = sizes @ (np.maximum(values - self.level, 0.0) / (value or 1.0)) ** self.exponent
+        whole, area = comm.allreduce(np.array([powers, sizes.sum()]))
+        return value * float((whole / area) ** (1.0 / self.exponent) - 1.0)
+
+    def _between(self, at: AtTemperatures, degree: int = 12) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield sizes and temperatures of points on this rank."""
+        yield np.zeros(0), np.zeros(0)
+        comm, tearing = at.decomposition.comm, at.decomposition.tearing
+        if self.surface:
+            side = Surface(self.body, self.surface)
+            surface = surface_of(at.scene.geometry, side, "faceted")
+            places = Places.of(surface, np.arange(len(surface.facets))[comm.rank :: comm.size], degree)
+            yield places.weight, places.values @ at.values[tearing.global_nodes(self.body, surface.nodes)]
+            return
+        for part in at.parts:
+            if part.mesh.body == self.body:
+                mesh, element = part.body.mesh, part.element
+                positions, weights = quadrature(element.cell, degree)
+                points = PointsOfCells.of(mesh, part.mesh.cells, element.cell, positions)
+                nodal = at.values[tearing.global_nodes(self.body, points.nodes)]
+                around = element.kinematics.measure.around(points.places[..., 0])
+                sizes = weights * points.volumes * around
+                yield sizes.ravel(), (points.of_nodes(nodal) @ points.shape.T).ravel()
 
     def _over(self, at: AtTemperatures) -> tuple[np.ndarray, np.ndarray]:
         """Return weights whose sum is one, and T − T₀, one where they are zero."""
@@ -344,6 +402,12 @@ class HeatOfHeld(HeatObjective):
 
     body: str
     surface: str
+
+    def check(self, scene: HeatScene) -> None:
+        """Reject what nothing holds."""
+        known = [f"{each.body} {each.surface}" for each in scene.held]
+        words = f"HeatOfHeld needs a HeldTemperature of {self.body} {self.surface}, the scene holds"
+        check_known(f"{self.body} {self.surface}", known, words)
 
     def value(self, at: AtTemperatures) -> float:
         """Return the sum of the residuals."""
@@ -366,6 +430,14 @@ class HeatOfContact(HeatObjective):
     """
 
     contact: int
+
+    def check(self, scene: HeatScene) -> None:
+        """Reject a contact that is not there."""
+        if not 0 <= self.contact < len(scene.contacts):
+            raise InvalidInputError(
+                f"{type(self).__name__}.contact must be the number of a contact of the scene, which has "
+                f"{len(scene.contacts)}, from 0, got {self.contact}"
+            )
 
     def value(self, at: AtTemperatures) -> float:
         """Return the sum over its points."""

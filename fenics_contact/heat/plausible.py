@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,13 +16,19 @@ from fenics_contact.heat.parts import Radiation
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.materials.elastic import isotropic_constants
 
+if TYPE_CHECKING:
+    from fenics_contact.heat.state import HeatState
+
 _LOG = logging.getLogger(__name__)
 
 
-def odd_values(scene: HeatScene, metals: tuple[float, float] = (15.0, 430.0)) -> Iterator[str]:
-    """Return words on constants in W and m in bodies that are measured in mm.
+def odd_values(
+    scene: HeatScene, metals: tuple[float, float] = (15.0, 430.0), cold: float = 100.0
+) -> Iterator[str]:
+    """Return words on constants in W and m in bodies that are measured in mm, and radiation in °C.
 
-    `metals`: conductivities of metals, [W/(m K)], which are the same in N mm/s; capacities are a millionth.
+    `metals`: conductivities of metals, [W/(m K)], which are the same in N mm/s; capacities are a millionth;
+    `cold`: temperature of surroundings below which °C were meant, [K].
     """
     sizes = {name: float(np.ptp(body.mesh.points, axis=0).max()) for name, body in scene.bodies.items()}
     for name, material in ((n, each) for n, body in scene.bodies.items() for each in body.materials):
@@ -34,10 +41,28 @@ def odd_values(scene: HeatScene, metals: tuple[float, float] = (15.0, 430.0)) ->
                 "lengths are in m, or in mm with power in N mm/s"
             )
     for load in scene.loads:
+        if isinstance(load, Radiation) and not callable(load.ambient):
+            above = load.ambient - load.absolute_zero
+            if above < cold:
+                yield (
+                    f"odd temperatures in Radiation {load.place}? its surroundings are at {above:g} degrees "
+                    "above absolute zero; temperatures in °C need absolute_zero=-273.15"
+                )
         if sizes[load.body] >= LONG and getattr(load, "constant", 0.0) == Radiation.constant:
             yield (
                 f"odd units in Radiation {load.place}? its constant is in W/(m² K⁴), the body is "
                 f"{sizes[load.body]:.4g} long: in W and mm give constant=5.67e-14, in N mm/s 5.67e-11"
+            )
+
+
+def blocked(state: HeatState) -> Iterator[str]:
+    """Return words on contacts whose law needs a pressure, and that have none."""
+    for contact, each in zip(state.scene.contacts, state.contacts, strict=True):
+        if len(each.conductance) and not each.conductance.any():
+            yield (
+                f"no heat passes through {contact.place}: its conductance is zero at the pressures and gaps "
+                "of the scene; give ThermalContact(..., pressure=...), add a GapConductance, or take "
+                "solve_heated"
             )
 
 

@@ -30,7 +30,7 @@ from fenics_contact.heat.determined import (
 )
 from fenics_contact.heat.forms import HeatForms
 from fenics_contact.heat.joints import Joints
-from fenics_contact.heat.plausible import odd_values, warn_of
+from fenics_contact.heat.plausible import blocked, odd_values, warn_of
 from fenics_contact.heat.rows import ConductingRows
 from fenics_contact.heat.scene import HeatScene
 from fenics_contact.heat.solved import Solved, refined
@@ -324,4 +324,6 @@ def solve_heat(
     """
     problem = HeatProblem(scene, comm, partitions=partitions, tolerance=tolerance)
     warn_of(odd_values(scene), comm)
-    return problem.solve()
+    state = problem.solve()
+    warn_of(blocked(state), comm)
+    return state

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, RigidPlane, Scene, Support, Surface, Tie
+from fenics_contact import Body, ContactPair, RigidPlane, Scene, Support, Surface, Tie
 from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.gallery import rectangle
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.heat import (
     Conductance,
     ConductingBody,
@@ -20,17 +20,25 @@ from fenics_contact.heat import (
     Convection,
     GapConductance,
     HeatFlux,
+    HeatObjective,
+    HeatOfContact,
+    HeatOfHeld,
     HeatScene,
     HeldTemperature,
+    JointResistance,
     PressureConductance,
     Radiation,
+    TemperatureMean,
     ThermalContact,
+    heat_adjoint,
+    heat_goal_error,
     solve_heat,
+    solve_heat_to,
     solve_heated,
 )
 from fenics_contact.heat.conductance import Touch
 from fenics_contact.heat.plausible import odd_power, odd_values
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain, PlaneStress
 
 
 def bars(count: int = 3, conductivity: float = 2.0, size: float = 1.0, **parts: Any) -> HeatScene:
@@ -201,3 +209,87 @@ def test_heat_does_not_pass_between_surfaces_of_one_body():
 def test_only_scenes_of_heat_are_solved_for_temperatures():
     with pytest.raises(InvalidInputError, match="must be a HeatScene, got an int"):
         solve_heat(3, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize(
+    ("objective", "words"),
+    [
+        (HeatOfContact(7), "HeatOfContact.contact must be the number of a contact of the scene, which has 0"),
+        (JointResistance(-1), "JointResistance.contact must be the number of a contact"),
+        (HeatOfHeld("a", "y0"), r"HeatOfHeld needs a HeldTemperature of a y0, the scene holds \['a x0'\]"),
+        (TemperatureMean("q"), "TemperatureMean names body 'q', the scene has"),
+        (TemperatureMean("a", "q"), "TemperatureMean names surface 'q', the body has"),
+    ],
+)
+def test_quantities_of_what_is_not_there_are_refused(objective: HeatObjective, words: str):
+    scene = HeatScene({"a": plate()}, [HeldTemperature("a", "x0", 1.0)])
+    with pytest.raises(InvalidInputError, match=words):
+        heat_adjoint(solve_heat(scene, MPI.COMM_SELF), objective)
+    with pytest.raises(InvalidInputError, match=words):
+        solve_heat_to(scene, objective, 0.1, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize("exponent", [0.0, -1.0, np.inf, np.nan])
+def test_powers_of_which_there_is_no_mean(exponent: float):
+    with pytest.raises(InvalidInputError, match=r"TemperatureMean\.exponent must be"):
+        TemperatureMean("a", exponent=exponent)
+
+
+def test_heat_and_mechanics_of_other_kinds_of_bodies():
+    mesh, elastic = rectangle((1.0, 0.0), (2.0, 1.0), (2, 2)), IsotropicElasticity(1e3, 0.3)
+    turned = Scene({"a": Body(mesh, elastic, axisymmetric=True)}, [Support("a", "y0", (None, 0.0))])
+    flat = HeatScene({"a": ConductingBody(mesh, Conductor(1.0))}, [HeldTemperature("a", "x0", 1.0)])
+    words = r"both of revolution or none, got .* axisymmetric=False and True"
+    with pytest.raises(InvalidInputError, match=words):
+        solve_heated(turned, flat, MPI.COMM_SELF)
+    thin = Scene({"a": Body(mesh, PlaneStress(1e3, 0.3, thickness=2.0))}, [Support("a", "y0")])
+    with pytest.raises(InvalidInputError, match=r"need body 'a' of one thickness, .* got 1 and \[2.0\]"):
+        solve_heated(thin, flat, MPI.COMM_SELF)
+
+
+def test_errors_of_states_with_mechanics_are_not_estimated():
+    scene = Scene({"a": Body(plate().mesh, PlaneStrain(1e3, 0.3))}, [Support("a", "y0")])
+    both = solve_heated(scene, HeatScene({"a": plate()}, [HeldTemperature("a", "x0", 1.0)]), MPI.COMM_SELF)
+    with pytest.raises(InvalidInputError, match="errors are estimated of temperatures alone"):
+        heat_goal_error(both, TemperatureMean("a"))  # type: ignore[arg-type]
+
+
+def test_contacts_that_pass_nothing_and_radiation_in_celsius_are_named(caplog: pytest.LogCaptureFixture):
+    held = [HeldTemperature("a", "x0", 80.0), HeldTemperature("b", "x1", 20.0)]
+    for pressure, count in ((0.0, 1), (3.0, 0)):
+        caplog.clear()
+        law = PressureConductance(1.0, 1.0)
+        joint = ThermalContact(Surface("a", "x1"), Surface("b", "x0"), law, pressure=pressure)
+        solve_heat(bars(2, held=held, contacts=[joint]), MPI.COMM_SELF)
+        found = [
+            each for each in caplog.messages if "no heat passes through a x1 - b x0: its conductance" in each
+        ]
+        assert len(found) == count
+    for ambient, zero, words in ((20.0, 0.0, 1), (20.0, -273.15, 0), (300.0, 0.0, 0)):
+        loads = [Radiation("a", "y0", 0.5, ambient, absolute_zero=zero)]
+        odd = [
+            each for each in odd_values(bars(2, held=held, loads=loads)) if "absolute_zero=-273.15" in each
+        ]
+        assert len(odd) == words
+
+
+def test_changes_of_temperature_that_are_rounding_strain_nothing():
+    # An open gap beside strains of 1e-14 is more than mechanics resolves.
+    steel = IsotropicElasticity(2.1e5, 0.0, thermal_expansion=1.2e-5)
+    boxes = {"a": ((0, 0, 0), (10, 2, 2)), "b": ((10.005, 0, 0), (16.005, 2, 2))}
+    bodies = {name: Body(block(*ends, (3, 1, 1)), steel) for name, ends in boxes.items()}
+    held = [Support("a", "x0", (0.0, None, None)), Support("b", "x1", (0.0, None, None))]
+    for name in bodies:
+        held += [Support(name, side, (None, 0.0, None)) for side in ("y0", "y1")]
+        held += [Support(name, side, (None, None, 0.0)) for side in ("z0", "z1")]
+    sides = Surface("a", "x1"), Surface("b", "x0")
+    scene = Scene(bodies, held, contacts=[ContactPair(*sides)])
+    law = PressureConductance(1.0, 1.0) + GapConductance(0.001, least_gap=0.01)
+    for apart in (0.0, 1e-9, 1e-3):
+        ends = [HeldTemperature("a", "x0", 20.0 + apart), HeldTemperature("b", "x1", 20.0 + apart)]
+        conduct = {name: Conductor(50.0) for name in bodies}
+        heat = HeatScene.on(scene, conduct, held=ends, contacts=[ThermalContact(*sides, law)])
+        both = solve_heated(scene, heat, MPI.COMM_SELF, stress_free=20.0)
+        assert not both.mechanics.contact.normal_force.any()
+        moved = both.mechanics.gather_displacement("a")[:, 0].max()
+        assert moved == pytest.approx(1.2e-5 * 10.0 * apart, rel=1e-5, abs=1e-12)

@@ -17,6 +17,7 @@ from fenics_contact.heat import (
     ConductingBody,
     Conductor,
     GapConductance,
+    HeatFlux,
     HeatOfContact,
     HeatOfHeld,
     HeatProblem,
@@ -182,6 +183,24 @@ def test_a_value_that_grows_while_its_error_falls_is_no_infinite_one() -> None:
         way._corrected = [each.value for each in way.levels]
         assert way._hopeless().startswith(words)
         assert bool(way._hopeless()) == bool(words)
+
+
+def test_powers_between_nodes_are_part_of_the_error() -> None:
+    body = ConductingBody(disc(10.0, 3, hole=4.0), Conductor(0.05))
+    scene = HeatScene(
+        {"ring": body}, [HeldTemperature("ring", "outer", 20.0)], [HeatFlux("ring", "inner", 2.5, total=True)]
+    )
+    radius = np.linspace(4.0, 10.0, 20001)
+    hot = 20.0 + 2.5 / (2.0 * np.pi * 0.05) * np.log(10.0 / radius)
+    mean = hot.max() * (np.sum((hot / hot.max()) ** 200 * radius) / np.sum(radius)) ** (1 / 200)
+    for over in ("", "inner"):
+        exact = mean if not over else hot.max()
+        goal = TemperatureMean("ring", over, exponent=200.0)
+        rough = heat_goal_error(solve_heat(scene, MPI.COMM_SELF), goal)
+        assert abs(exact - rough.value - rough.total) < 0.2 * abs(exact - rough.value)
+    found = solve_heat_to(scene, TemperatureMean("ring", exponent=200.0), 0.02, MPI.COMM_SELF)
+    assert found.reached
+    assert abs(found.value - mean) < 0.1 * found.error
 
 
 def test_limits_end_the_way() -> None:

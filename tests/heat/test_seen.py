@@ -165,7 +165,9 @@ def test_the_table_of_contact_points_has_both_temperatures(tmp_path: Path):
 
 
 def test_the_table_of_the_balance_has_a_row_for_each_state(tmp_path: Path):
-    path = write_heat_balance([plates(), plates()], tmp_path / "balance.csv", times=[0.0, 2.5])
+    path = write_heat_balance([plates(), plates()], tmp_path / "balance.csv", times=np.array([0.0, 2.5]))
+    with pytest.raises(InvalidInputError, match="needs a time of each state, 2, got 3"):
+        write_heat_balance([plates(), plates()], tmp_path / "other.csv", times=[0.0, 1.0, 2.0])
     rows = rows_of(path)
     assert [row["time"] for row in rows] == ["0", "2.5"]
     assert float(rows[1]["HeatFlux upper z1"]) == pytest.approx(1.8)
