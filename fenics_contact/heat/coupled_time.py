@@ -120,8 +120,8 @@ def heated_in_time(
     warn_of(odd_values(first[1]), comm)
     warn_of(odd_power(*first), comm)
     problems = getattr(initial, "problems", ())
-    mechanics = ContactProblem(first[0], comm, partitions=partitions, tolerance=mechanics_tolerance)
-    mechanics = problems[0] if problems else mechanics
+    rest: Any = {"partitions": partitions, "tolerance": mechanics_tolerance}
+    mechanics = problems[0] if problems else ContactProblem(first[0], comm, **rest)
 
     def march() -> March:
         return _Both(mechanics, HeatProblem(first[1], comm, partitions=partitions), at, cold, settled)

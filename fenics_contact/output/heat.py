@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact.errors import InvalidInputError, collectively, together
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 @collectively("write_heat_balance", lambda states, *_, **__: states[0].comm)
 @naming_arguments
 def write_heat_balance(
-    states: Sequence[HeatState | HeatedState], path: str | Path, times: ArrayLike = ()
+    states: Sequence[HeatState | HeatedState], path: str | Path, times: Sequence[float] | np.ndarray = ()
 ) -> Path:
     """Write temperatures and where heat comes from as a table (CSV), a row a state. Collective.
 
@@ -41,15 +40,14 @@ def write_heat_balance(
     Example:
         >>> write_heat_balance([state], "output/balance.csv")  # doctest: +SKIP
     """
-    given = np.asarray(times, dtype=float).ravel()
-    if len(given) not in (0, len(states)):
+    given = list(times) or list(range(len(states)))
+    if len(given) != len(states):
         raise InvalidInputError(
             f"write_heat_balance needs a time of each state, {len(states)}, got {len(given)}: those of a "
             "HeatHistory are history.times[1:]"
         )
     rows: list[dict[str, Any]] = []
-    numbered = given if len(given) else range(len(states))
-    for time, state in zip(numbered, (each.heat for each in states), strict=True):
+    for time, state in zip(given, (each.heat for each in states), strict=True):
         row: dict[str, Any] = {"time": float(time)}
         for body, own in state.temperature.items():
             row |= {f"{body} least": own.min(), f"{body} largest": own.max()}
