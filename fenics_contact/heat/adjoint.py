@@ -55,6 +55,7 @@ class HeatAdjoint:
         ties: The same of tied points, (n,).
         iterations: Linear systems of heat that were solved, and adjoints of mechanics where there is one.
         products: Applications of the dual operator of heat.
+        at: The scene at the temperatures of the state, as they were differentiated.
         heat: The temperatures of the state.
         mechanics: What moves its bodies, with its adjoint of J − wᵀ R.
     """
@@ -66,6 +67,7 @@ class HeatAdjoint:
     ties: np.ndarray
     iterations: int
     products: int
+    at: AtTemperatures = field(repr=False)
     heat: HeatState = field(repr=False)
     mechanics: NoMechanics = field(repr=False)
 
@@ -158,7 +160,7 @@ def heat_adjoint(
         change, size = np.abs(found - w).max(), np.abs(found).max()
         if (linear and mechanics.is_fixed) or change <= 10.0 * tolerance * size:
             products = systems.products
-            return HeatAdjoint(quantity, state, value, found, ties, count, products, warm, mechanics)
+            return HeatAdjoint(quantity, state, value, found, ties, count, products, at, warm, mechanics)
         w = anderson.next(w, found)
     raise ConvergenceError(
         f"the adjoint does not settle, it changes by {change:.2g} of {size:.2g} after {most} systems: "

@@ -62,12 +62,11 @@ def heat_goal_error(state: HeatState, objective: HeatObjective, *, tolerance: fl
             "known here: give the state of solve_heat"
         )
     adjoint = heat_adjoint(state, objective, tolerance=tolerance)
-    decomposition, value = state.torn.decomposition, adjoint.value
-    comm, at = decomposition.comm, AtTemperatures.of(state.scene, decomposition, state.values)
+    comm, at, value = state.comm, adjoint.at, adjoint.value
     weight, balanced = adjoint.values - objective.partials(at)[2], adjoint.lagrangian(at)
     (found, own), between_nodes = _between_gradients(state, weight), objective.missing(at)
     between, apart = between_points(state, weight)
-    geometry, curved = _by_geometry(adjoint, at, weight)
+    geometry, curved = _by_geometry(adjoint, balanced, weight)
     own = {n: (cells, shares + (curved[n] + apart[n])[cells]) for n, (cells, shares) in own.items()}
     sums = np.array([found, *(float(shares.sum()) for _, shares in own.values())])
     sums = np.asarray(comm.allreduce(sums))
@@ -106,20 +105,21 @@ def _products(state: HeatState, mesh: SubdomainMesh, fields: np.ndarray, gradien
     missed = np.einsum("qa,cafi->fcqi", at.shape, slopes) - np.einsum("cqai,caf->fcqi", at.slopes, values)
     temperature = values[..., 0] @ at.shape.T
     flux = [body.conducted(mesh.cells, at.places, temperature, each) for each in missed]
-    volume = body.thickness * weights * at.volumes * element.kinematics.measure.around(at.places[..., 0])
+    volume = body.thickness * at.sizes(weights, element.kinematics.measure)
     return np.einsum("cq,fcqi,gcqi->cfg", volume, missed, np.stack(flux))
 
 
 def _by_geometry(
-    adjoint: HeatAdjoint, here: AtTemperatures, weight: np.ndarray, step: float = 1e-3
+    adjoint: HeatAdjoint, balanced: float, weight: np.ndarray, step: float = 1e-3
 ) -> tuple[float, dict[str, np.ndarray]]:
     """Return the derivative of J − wᵀ R along the way of curved boundaries to their true shapes. Collective.
 
     And of each body the shares of its cells, (n_cells,), by how far their nodes go. Arcs are longer than
     their chords by half of what chords grow by when moved to enclose as much: surfaces go half of the way.
-    Gaps are those between true surfaces and do not change. `here`: the state on its facets; `weight`: w less
-    what is part of J; `step`: part of the way by which the difference is taken.
+    Gaps are those between true surfaces and do not change. `balanced`: J − wᵀ R on the facets; `weight`: w
+    less what is part of J; `step`: part of the way by which the difference is taken.
     """
+    here = adjoint.at
     scene, decomposition = here.scene, here.decomposition
     shares = {name: np.zeros(body.mesh.n_cells) for name, body in scene.bodies.items()}
     with together(decomposition.comm):
@@ -132,7 +132,7 @@ def _by_geometry(
     there = replace(there, joints=replace(here.joints, area=there.joints.area), given=here.given)
     inside = (replace(each, contacts=(), loads=_in_volumes(each)) for each in (scene, moved))
     before, after = (AtTemperatures.of(each, decomposition, here.values).residual for each in inside)
-    change = adjoint.lagrangian(there) - adjoint.lagrangian(here) - weight @ (after - before)
+    change = adjoint.lagrangian(there) - balanced - weight @ (after - before)
     for name, mesh in meshes.items():
         length = np.linalg.norm(mesh.points - scene.bodies[name].mesh.points, axis=1)
         shares[name] = length[mesh.cells].sum(axis=1)

@@ -144,7 +144,16 @@ class AtTemperatures:
 
     def weights(self, body: str, surface: str) -> np.ndarray:
         """Return ∫ φ and ∫ φ² of each node over a surface, or a body, (2, n_nodes). Collective."""
+        if (body, surface) not in self._weights:
+            self._weights[body, surface] = self._weighed(body, surface)
+        return self._weights[body, surface]
 
+    @cached_property
+    def _weights(self) -> dict[tuple[str, str], np.ndarray]:
+        """Those that were asked for."""
+        return {}
+
+    def _weighed(self, body: str, surface: str) -> np.ndarray:
         def mass(part: Part, power: int) -> np.ndarray:
             part.place()
             ones = np.full(part.mesh.size, float(part.mesh.body == body))
@@ -380,8 +389,7 @@ class TemperatureMean(HeatObjective):
                 positions, weights = quadrature(element.cell, degree)
                 points = PointsOfCells.of(mesh, part.mesh.cells, element.cell, positions)
                 nodal = at.values[tearing.global_nodes(self.body, points.nodes)]
-                around = element.kinematics.measure.around(points.places[..., 0])
-                sizes = weights * points.volumes * around
+                sizes = points.sizes(weights, element.kinematics.measure)
                 yield sizes.ravel(), (points.of_nodes(nodal) @ points.shape.T).ravel()
 
     def _over(self, at: AtTemperatures) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact._kinematics.measure import Measure
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CellType, shape_gradients, shape_values
 from fenics_contact.mesh.collapsed import as_hexahedra, places_of
@@ -38,6 +39,10 @@ class PointsOfCells:
         jacobian = np.einsum("cai,qaj->cqij", at, slopes)
         slopes, volumes = slopes @ np.linalg.inv(jacobian), np.abs(np.linalg.det(jacobian))
         return cls(nodes, shape, slopes, np.einsum("qa,cai->cqi", shape, at), volumes)
+
+    def sizes(self, weights: np.ndarray, measure: Measure) -> np.ndarray:
+        """Return what belongs to points by the weights of a quadrature, (n_points,), shape (n, n_points)."""
+        return np.asarray(weights * self.volumes * measure.around(self.places[..., 0]))
 
     def of_nodes(self, values: np.ndarray) -> np.ndarray:
         """Return values at the nodes of the cells, (n, m, ...), as at those of whole hexahedra."""
