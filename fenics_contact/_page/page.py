@@ -407,7 +407,8 @@ class Source:
     @property
     def units(self) -> Units:
         """The names of units that the result's scene file gives, mm, N and MPa if there are none."""
-        return Units(**((self.record.get("more") or {}).get("unit_names") or {}))
+        given = (self.record.get("more") or {}).get("unit_names") or {}
+        return Units(**{**(self.record.get("unit_names") or {}), **given})
 
     def turned(self, angle: float) -> Source:
         """Return it with sections turned around the axis into hexahedra or tetrahedra, which pages cut."""

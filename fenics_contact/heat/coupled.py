@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._equilibrium.previous import ONLY_STEP
@@ -230,6 +231,7 @@ def by_body(given: float | Mapping[str, float], heat: HeatScene) -> Mapping[str,
 
 
 @collectively("solve_heated", lambda scene, heat, comm, **_: comm)
+@naming_arguments
 def solve_heated(
     scene: Scene,
     heat: HeatScene,

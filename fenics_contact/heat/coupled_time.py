@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.libraries import MPI
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.scene import Scene
@@ -59,6 +60,7 @@ class _Both:
 
 
 @collectively("heated_in_time", lambda scene, heat, comm, *_, **__: comm)
+@naming_arguments
 def heated_in_time(
     scene: Scene | Callable[[float], Scene],
     heat: HeatScene | Callable[[float], HeatScene],

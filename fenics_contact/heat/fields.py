@@ -145,6 +145,11 @@ class BothOnBodies(OnBodies):
         return self.mechanics.comm
 
     @property
+    def unit_names(self) -> dict[str, str]:
+        """Power in N mm/s, as stresses are in N/mm²."""
+        return {"power": "mW"}
+
+    @property
     def geometry(self) -> Scene:
         """The scene of mechanics."""
         return self.mechanics.scene
@@ -181,7 +186,8 @@ class BothOnBodies(OnBodies):
     def record(self) -> dict[str, Any]:
         """Return what `write_result` writes of its heat."""
         heat = self.heat.record()
-        return {"heat": heat, **{name: heat[name] for name in ("temperature", "heat_balance")}}
+        seen = {name: heat[name] for name in ("temperature", "heat_balance")}
+        return {"heat": heat, "unit_names": self.unit_names, **seen}
 
 
 def _largest(by_material: np.ndarray) -> np.ndarray:

@@ -180,6 +180,12 @@ class Interaction:
 
 def check_fit(scene: Scene, heat: HeatScene, given: Mapping[str, float]) -> None:
     """Reject fields on different bodies or meshes, and materials that are free of stress elsewhere."""
+    flowing = [load.body for load in heat.loads if load.by_mechanics]
+    if twice := [name for name in flowing if flowing.count(name) > 1]:
+        raise InvalidInputError(
+            f"plastic work of a body becomes heat once, got several PlasticHeat of {twice[0]!r}: "
+            "add up shares"
+        )
     for load in heat.loads:
         plastic = load.body not in scene.bodies or any(map(has_history, scene.bodies[load.body].materials))
         if load.by_mechanics and not plastic:

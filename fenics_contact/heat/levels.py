@@ -17,6 +17,7 @@ from fenics_contact._adaptive.levels import (
     require_share,
 )
 from fenics_contact._adaptive.refined_scene import SceneRefinement
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.memory import Subdomains
 from fenics_contact._scene.scene import Scene
@@ -31,6 +32,7 @@ from fenics_contact.heat.state import HeatState
 
 
 @collectively("solve_heat_to", lambda scene, objective, relative_error, comm, **_: comm)
+@naming_arguments
 def solve_heat_to(
     scene: HeatScene,
     objective: HeatObjective,

@@ -25,7 +25,7 @@ Value: TypeAlias = float | OfPosition
 def _checked(name: str, given: Value) -> Value:
     if callable(given):
         return given
-    if finite_numbers(given).shape != ():
+    if isinstance(given, str | bool) or finite_numbers(given).shape != ():
         raise InvalidInputError(
             f"{name} must be a finite number or a function of points, got {given!r}: give one number, or a "
             "function of points, shape (n, dim), that returns one for each"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact._base.checks import kind_in_words
+from fenics_contact._base.checks import kind_in_words, naming_arguments
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import PhaseTimer
@@ -297,6 +297,7 @@ def _numbered_as(known: TornSystem, groups: RowGroups, decomposition: Decomposit
 
 
 @collectively("solve_heat", lambda scene, comm, **_: comm)
+@naming_arguments
 def solve_heat(
     scene: HeatScene,
     comm: MPI.Comm,

@@ -291,7 +291,7 @@ def property_of(name: str, given: Any, remedy: str) -> Property:
         return ByUfl(name, given)
     if callable(given):
         return ByFunction(name, given)
-    if finite_numbers(given).shape != ():
+    if isinstance(given, str | bool) or finite_numbers(given).shape != ():
         raise InvalidInputError(
             f"{name} must be a number, a TemperatureTable, a function of temperatures or Ufl, got {given!r}: "
             f"{remedy}"
@@ -330,7 +330,7 @@ class Conductor:
 
     def __post_init__(self) -> None:
         """Reject what does not conduct."""
-        if isinstance(self.conductivity, Sequence | np.ndarray):
+        if isinstance(self.conductivity, Sequence | np.ndarray) and not isinstance(self.conductivity, str):
             given = np.asarray(self.conductivity).tolist()
             object.__setattr__(
                 self, "conductivity", tuple(tuple(x) if isinstance(x, list) else x for x in given)

@@ -310,7 +310,18 @@ class HeatScene:
                     f"heat passes between surfaces of two bodies, got {contact.place} of one: split the "
                     "body and join its parts by a Tie"
                 )
+        self._require_one_way()
         _ = self.geometry, self.field
+
+    def _require_one_way(self) -> None:
+        """Reject surfaces between which heat passes in two ways."""
+        for contact in self.contacts:
+            both = [contact.slave, contact.master]
+            if any(both in ([tie.slave, tie.master], [tie.master, tie.slave]) for tie in self.ties):
+                raise InvalidInputError(
+                    f"heat passes between {contact.place} by a ThermalContact and by a Tie, which has no "
+                    "resistance: leave out one"
+                )
 
     @classmethod
     def on(cls, scene: Scene, materials: Mapping[str, Any], **parts: Any) -> Self:

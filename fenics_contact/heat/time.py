@@ -10,6 +10,7 @@ from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
+from fenics_contact._base.checks import naming_arguments
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import Task
@@ -267,6 +268,7 @@ class HeatHistory(Generic[Known]):
 
 
 @collectively("heat_in_time", lambda scene, comm, *_, **__: comm)
+@naming_arguments
 def heat_in_time(
     scene: HeatScene | Callable[[float], HeatScene],
     comm: MPI.Comm,

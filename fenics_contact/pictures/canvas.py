@@ -477,7 +477,7 @@ class Units:
         force: Unit of forces.
         stress: Unit of stresses and pressures, force / length².
         temperature: Unit of temperatures.
-        power: Unit of heat that flows; where heat is coupled to N and mm this is "N mm/s".
+        power: Unit of heat that flows; of states with mechanics "mW" by default, which is N mm/s.
     """
 
     length: str = "mm"

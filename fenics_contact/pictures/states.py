@@ -274,10 +274,10 @@ def plot_field(
         >>> used = {"pin": state.gather_von_mises("pin") / 235.0}  # doctest: +SKIP
         >>> plot_field(state, used, clip=((0, 0, 0), (0, 1, 0)), label="share of yield")  # doctest: +SKIP
     """
-    target, named = png_path(path), units or Units()
+    target, state = png_path(path), result if isinstance(result, OnBodies) else None
+    named = units or Units(**(state.unit_names if state else {}))
     checked_factor("scale", scale)
     given = checked_range(clim)
-    state = result if isinstance(result, OnBodies) else None
     if revolved:
         check_turned(revolved, state is not None and state.geometry.axisymmetric)
     every: Bodies = drawn_bodies(result) if isinstance(result, OnBodies) else result

@@ -35,6 +35,11 @@ class OnBodies(ABC):
         """The time at which obstacles that move are where they are: with small displacements zero."""
         return 0.0
 
+    @property
+    def unit_names(self) -> dict[str, str]:
+        """Names of its units that are not those of `pictures.Units`."""
+        return {}
+
     def tools(self) -> dict[str, ToolResult]:
         """Return where rigid tools are, by name. Collective."""
         return {}

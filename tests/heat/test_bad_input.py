@@ -26,6 +26,7 @@ from fenics_contact.heat import (
     HeatScene,
     HeldTemperature,
     JointResistance,
+    PlasticHeat,
     PressureConductance,
     Radiation,
     TemperatureMean,
@@ -38,7 +39,7 @@ from fenics_contact.heat import (
 )
 from fenics_contact.heat.conductance import Touch
 from fenics_contact.heat.plausible import odd_power, odd_values
-from fenics_contact.materials import IsotropicElasticity, PlaneStrain, PlaneStress
+from fenics_contact.materials import IsotropicElasticity, J2Plasticity, PlaneStrain, PlaneStress
 
 
 def bars(count: int = 3, conductivity: float = 2.0, size: float = 1.0, **parts: Any) -> HeatScene:
@@ -293,3 +294,37 @@ def test_changes_of_temperature_that_are_rounding_strain_nothing():
         assert not both.mechanics.contact.normal_force.any()
         moved = both.mechanics.gather_displacement("a")[:, 0].max()
         assert moved == pytest.approx(1.2e-5 * 10.0 * apart, rel=1e-5, abs=1e-12)
+
+
+def test_heat_passes_between_surfaces_in_one_way():
+    sides = Surface("a", "x1"), Surface("b", "x0")
+    with pytest.raises(InvalidInputError, match="a x1 - b x0 by a ThermalContact and by a Tie"):
+        bars(2, contacts=[ThermalContact(*sides, 1.0)], ties=[Tie(*sides[::-1])])
+
+
+@pytest.mark.parametrize("given", ["5", True])
+def test_numbers_are_no_words(given: Any):
+    with pytest.raises(InvalidInputError, match=r"HeatFlux\.value must be a finite number"):
+        HeatFlux("a", "y0", given)
+    with pytest.raises(InvalidInputError, match=r"Conductor\.conductivity must be a number"):
+        Conductor(given)
+
+
+def test_plastic_work_becomes_heat_once():
+    metal = Scene({"a": Body(plate().mesh, J2Plasticity(1e3, 0.3, 1.0))}, [Support("a", "y0")])
+    heat = HeatScene.on(
+        metal, {"a": Conductor(1.0, 1.0)}, loads=[PlasticHeat("a", 0.5), PlasticHeat("a", 0.4)]
+    )
+    with pytest.raises(InvalidInputError, match="got several PlasticHeat of 'a': add up shares"):
+        solve_heated(metal, heat, MPI.COMM_SELF)
+
+
+def test_arguments_of_other_kinds_are_named():
+    scene = Scene({"a": Body(plate().mesh, PlaneStrain(1e3, 0.3))}, [Support("a", "y0")])
+    heat = HeatScene({"a": plate()}, [HeldTemperature("a", "x0", 1.0)])
+    with pytest.raises(InvalidInputError, match="scene"):
+        solve_heated(heat, scene, MPI.COMM_SELF)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="limits"):
+        solve_heat_to(heat, TemperatureMean("a"), 0.1, MPI.COMM_SELF, limits={"levels": 2})  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="stress_free"):
+        solve_heated(scene, heat, MPI.COMM_SELF, stress_free="20")  # type: ignore[arg-type]

@@ -232,6 +232,10 @@ def test_mechanics_and_heat_are_seen_together(tmp_path: Path):
     assert record["heat"]["contact"][0]["heat"] == pytest.approx(state.heat.contacts[0].total)
     text = result_page(tmp_path).html or ""
     assert "temperature of upper" in text
+    assert f"{state.heat.balance.by_part['HeldTemperature upper z1']:.5g} mW" in text  # N mm/s
+    named = Units(**state.unit_names)
+    pictures = [plot_field(state, "nodal_heat_flux", units=units, width=300).png for units in (None, named)]
+    assert pictures[0] == pictures[1] != plot_field(state, "nodal_heat_flux", units=Units(), width=300).png
     assert "sum of normal forces" in text
     frd = read_frd(write_frd(tmp_path / "both.frd", state))
     kinds = {"DISP", "STRESS", "TOSTRAIN", "FORC", "CONTACT", "NDTEMP", "FLUX"}
