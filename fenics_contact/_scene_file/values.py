@@ -141,7 +141,7 @@ class Expression:
         if self.changes and self.time is None:
             raise InvalidInputError(
                 f"the formula {shortened(self.text)!r} depends on the time t, which only loads and supports "
-                "of a file with [[steps]] have: add steps, or leave t out"
+                "of a file with [[steps]] have, and heat of one with [heat.time]: add these, or leave t out"
             )
         missing = self.names - {*values, TIME}
         if missing:

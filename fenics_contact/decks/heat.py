@@ -159,7 +159,8 @@ class HeatDeck:
     @property
     def notes(self) -> Sequence[str]:
         """What is done otherwise than the deck says, and known cards without effect."""
-        return [*self.frame.notes, *(note for each in self.mechanics for note in each.notes)]
+        every = [*self.frame.notes, *(note for each in self.mechanics for note in each.notes)]
+        return list(dict.fromkeys(every))
 
     def _by_number(self, temperature: Mapping[str, np.ndarray]) -> Temperatures:
         """Return numbers of nodes and their temperatures."""
