@@ -49,10 +49,7 @@ class Interaction:
     @cached_property
     def pairs(self) -> dict[int, int]:
         """Number of a thermal contact -> that of the contact pair with its surfaces, where there is one."""
-        pairs = [[pair.slave, pair.master] for pair in self.scene.contacts]
-        sides = [[contact.slave, contact.master] for contact in self.heat.contacts]
-        found = {k: [both in (each, each[::-1]) for each in pairs] for k, both in enumerate(sides)}
-        return {number: same.index(True) for number, same in found.items() if True in same}
+        return pairs_with_heat(self.scene, self.heat)
 
     @property
     def mechanics_heats(self) -> bool:
@@ -178,6 +175,14 @@ class Interaction:
             yield number, place, mine, onto.tocsr()
 
 
+def pairs_with_heat(scene: Scene, heat: HeatScene) -> dict[int, int]:
+    """Return number of a thermal contact -> that of the contact pair with its surfaces, if there is one."""
+    pairs = [[pair.slave, pair.master] for pair in scene.contacts]
+    sides = [[contact.slave, contact.master] for contact in heat.contacts]
+    found = {k: [both in (each, each[::-1]) for each in pairs] for k, both in enumerate(sides)}
+    return {number: same.index(True) for number, same in found.items() if True in same}
+
+
 def check_fit(scene: Scene, heat: HeatScene, given: Mapping[str, float]) -> None:
     """Reject fields on different bodies or meshes, and materials that are free of stress elsewhere."""
     flowing = [load.body for load in heat.loads if load.by_mechanics]
@@ -193,9 +198,20 @@ def check_fit(scene: Scene, heat: HeatScene, given: Mapping[str, float]) -> None
                 f"PlasticHeat needs a material of body {load.body!r} that flows, got none: give one, such as "
                 "J2Plasticity"
             )
+    for contact in (heat.contacts[number] for number in pairs_with_heat(scene, heat)):
+        if callable(contact.pressure) or contact.pressure:
+            raise InvalidInputError(
+                f"{contact.place} has the pressures of the contact pair with its surfaces, got "
+                "ThermalContact.pressure as well: leave it out"
+            )
     for name, body in heat.bodies.items():
         check_known(name, scene.bodies, f"heat is of body {name!r}, the mechanics has")
         check_known(name, given, f"stress_free needs a temperature of body {name!r}, it has")
+        if not np.isfinite(given[name]):
+            raise InvalidInputError(
+                f"stress_free of body {name!r} must be finite, got {given[name]!r}: give the temperature at "
+                "which it has no thermal strain"
+            )
         points, known = body.mesh.points, scene.bodies[name].mesh.points
         if not np.array_equal(known, points):
             raise InvalidInputError(

@@ -330,7 +330,7 @@ class Conductor:
 
     def __post_init__(self) -> None:
         """Reject what does not conduct."""
-        if isinstance(self.conductivity, Sequence | np.ndarray) and not isinstance(self.conductivity, str):
+        if isinstance(self.conductivity, list | tuple | np.ndarray):
             given = np.asarray(self.conductivity).tolist()
             object.__setattr__(
                 self, "conductivity", tuple(tuple(x) if isinstance(x, list) else x for x in given)

@@ -189,8 +189,8 @@ class ThermalContact:
         master: Surface of another body, or a rigid obstacle of a given temperature.
         conductance: A number h > 0, [power / (length² · degree)], or a `Conductance`; laws add up by "+".
         temperature: Of an obstacle: a number or a function of the slave's points, in degrees.
-        pressure: Pressure where it does not come from mechanics, a number or a function of the slave's
-            points, [force / length²].
+        pressure: Pressure where mechanics does not give it, because no contact pair has these surfaces: a
+            number or a function of the slave's points, [force / length²].
         discretisation: "node", "mortar" or "best", as in `ContactPair`.
         geometry: As in `ContactPair`.
         friction: Heat that arises where the surfaces slide; none by default.

@@ -328,3 +328,23 @@ def test_arguments_of_other_kinds_are_named():
         solve_heat_to(heat, TemperatureMean("a"), 0.1, MPI.COMM_SELF, limits={"levels": 2})  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="stress_free"):
         solve_heated(scene, heat, MPI.COMM_SELF, stress_free="20")  # type: ignore[arg-type]
+
+
+def test_mechanics_gives_pressures_and_needs_a_temperature_free_of_stress():
+    bodies = {
+        "a": Body(plate().mesh, PlaneStrain(1e3, 0.3)),
+        "b": Body(plate(1.0).mesh, PlaneStrain(1e3, 0.3)),
+    }
+    sides = Surface("a", "x1"), Surface("b", "x0")
+    scene = Scene(bodies, [Support("a", "x0"), Support("b", "x1")], contacts=[ContactPair(*sides)])
+    conduct = {name: Conductor(50.0) for name in bodies}
+    ends = [HeldTemperature("a", "x0", 1.0), HeldTemperature("b", "x1", 0.0)]
+    for given, words in (
+        (ThermalContact(*sides, 1.0, pressure=2.0), "pressures of the contact pair"),
+        (ThermalContact(*sides[::-1], 1.0, pressure=lambda x: x[:, 0]), "pressures of the contact pair"),
+    ):
+        with pytest.raises(InvalidInputError, match=words):
+            solve_heated(scene, HeatScene.on(scene, conduct, held=ends, contacts=[given]), MPI.COMM_SELF)
+    heat = HeatScene.on(scene, conduct, held=ends, contacts=[ThermalContact(*sides, 1.0)])
+    with pytest.raises(InvalidInputError, match="stress_free of body 'a' must be finite"):
+        solve_heated(scene, heat, MPI.COMM_SELF, stress_free=np.nan)
