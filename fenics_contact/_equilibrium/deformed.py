@@ -113,8 +113,8 @@ class DeformedEquilibria:
     def _solve(self, scene: Scene, previous: Previous, wanted: Wanted) -> DeformedState:
         equations, timer, before = self._equations, self._timer, previous.last
         steps = _as_accurate_as(wanted, self._steps)
-        for loop in outer_loops(scene):
-            loop.follow(equations.contact, before, steps)
+        contact, loops = equations.contact, outer_loops(scene)
+        contact.feedbacks = sum((loop.feedback(contact, before, steps) for loop in loops), start=())
         with timer.phase("assemble"):
             start = self._start(scene, previous)
         self._require_later(scene, start.time, wanted.time)
@@ -187,8 +187,8 @@ class DeformedEquilibria:
         """Build a state from what `stored_deformed` returned, with one factorisation. Collective."""
         timer, equations = self._timer, self._equations
         self._put_inside(InFacets.restored(stored, scene.dim))
-        for loop in outer_loops(scene):
-            loop.follow_stored(equations.contact, stored)
+        contact, loops = equations.contact, outer_loops(scene)
+        contact.feedbacks = sum((loop.stored_feedback(contact, stored) for loop in loops), start=())
         with timer.phase("assemble"):
             load = whole = self._loading(scene, float(stored["times"][1]))
             at, load = stored_configuration(stored, load, equations.contact, self.decomposition)
@@ -463,7 +463,7 @@ def _energies(evaluation: ResidualState, earlier_friction_work: float) -> Energi
     """
     stored = [np.nan if response.energy is None else response.energy for response in evaluation.responses]
     strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
-    work = evaluation.growth.work(evaluation.torn, evaluation.at.displacement)
+    work = evaluation.growth.work(evaluation.torn, evaluation.at.displacement) + evaluation.torn.fluid.work
     turned = evaluation.load.turned
     strain += sum(0.5 * float(each.springs @ each.motion**2) for each in turned)
     work += sum(each.work for each in turned if each.free.any())

@@ -18,7 +18,7 @@ def outer_loops(scene: Scene) -> list[OuterLoop]:
     if any(pair.fluid is not None for pair in scene.contacts):
         from fenics_contact._equilibrium.penetration import FluidFront
 
-        loops.append(FluidFront())
+        loops.append(FluidFront(scene))
     if any(pair.slip_table is not None for pair in scene.contacts):
         from fenics_contact._equilibrium.slip_dependence import FrictionBySlip
 

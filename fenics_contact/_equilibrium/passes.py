@@ -17,6 +17,7 @@ from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State, Tolerance
 
 if TYPE_CHECKING:
+    from fenics_contact._large_deformations.contact_feedback import ContactFeedback
     from fenics_contact._large_deformations.load_steps import AutomaticSteps
     from fenics_contact._large_deformations.moving_contact import Contact
 
@@ -114,11 +115,14 @@ class OuterLoop(ABC):
         `before`: the state at the end of the load step before.
         """
 
-    def follow(self, contact: Contact, before: State | None, steps: AutomaticSteps) -> None:
-        """Let contact of bodies that deform much begin where a state has left this loop.
+    def feedback(
+        self, contact: Contact, before: State | None, steps: AutomaticSteps
+    ) -> tuple[ContactFeedback, ...]:
+        """Return what contact of bodies that deform much begins with where a state has left this loop.
 
-        `steps`: how their load is followed.
+        `steps`: how their load is followed. Collective.
         """
+        return ()
 
     @abstractmethod
     def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
@@ -128,5 +132,8 @@ class OuterLoop(ABC):
     def restored(self, torn: TornSystem, stored: Mapping[str, np.ndarray]) -> TornSystem:
         """Return a system with what was stored. Collective."""
 
-    def follow_stored(self, contact: Contact, stored: Mapping[str, np.ndarray]) -> None:
-        """Let contact of bodies that deform much begin where a stored state began."""
+    def stored_feedback(
+        self, contact: Contact, stored: Mapping[str, np.ndarray]
+    ) -> tuple[ContactFeedback, ...]:
+        """Return what contact of bodies that deform much began with in a stored state. Collective."""
+        return ()

@@ -76,8 +76,8 @@ class Wearing(OuterLoop):
             passes.history,
         )
 
-    def follow(self, contact: Contact, before: State | None, steps: AutomaticSteps) -> None:
-        """Let contact begin with what a state has lost, and slide as in its load step until it knows better.
+    def feedback(self, contact: Contact, before: State | None, steps: AutomaticSteps) -> tuple[EarlierWear]:
+        """Return what a state has lost, with the slip of its load step until contact knows better.
 
         Raises:
             InvalidInputError: If parts of load steps have histories of their own, or bodies may snap.
@@ -87,7 +87,7 @@ class Wearing(OuterLoop):
                 "wear is that of whole load steps, got AutomaticSteps with finer_history or snaps: leave "
                 "them out, and give more load steps"
             )
-        contact.wear = EarlierWear.of(() if before is None else (before,))
+        return (EarlierWear.of(() if before is None else (before,)),)
 
     def stored(self, torn: TornSystem) -> dict[str, np.ndarray]:
         """Return what points had lost, and their distances."""
@@ -103,10 +103,10 @@ class Wearing(OuterLoop):
         wear = PointWear.of(torn.scene, torn.points, lost, torn.decomposition.comm)
         return wear.on(torn, stored["distance"])
 
-    def follow_stored(self, contact: Contact, stored: Mapping[str, np.ndarray]) -> None:
-        """Let contact begin with what a stored state had lost before its load step."""
+    def stored_feedback(self, contact: Contact, stored: Mapping[str, np.ndarray]) -> tuple[EarlierWear]:
+        """Return what a stored state had lost before its load step."""
         lost = AtNodes.keyed(stored["lost_at"], stored["lost"])
-        contact.wear = EarlierWear(lost, AtNodes.keyed(stored["slid_at"], stored["slip"][0]))
+        return (EarlierWear(lost, AtNodes.keyed(stored["slid_at"], stored["slip"][0])),)
 
 
 def _lost(torn: TornSystem, before: State | None) -> np.ndarray:

@@ -224,7 +224,7 @@ class ResidualState:
         self, timer: PhaseTimer, earlier: Mapping[int, TangentOperator], sprung: Sequence[TurnedSurface]
     ) -> Linearisation:
         self._require_finite_tangents()
-        uneven = self.growth.unsymmetric(self.torn.decomposition, self.load.rim)
+        uneven = self.growth.unsymmetric(self.torn.decomposition, self.load.rim | self.contact.acting.rim)
         held = SymmetricLowRank(*spring_columns(sprung, self.contact.prescribed.size))
         turning = self.contact.turning(self.at.multiplier, uneven, held)
         torn, further = self.torn, NO_ROWS
@@ -390,21 +390,22 @@ class Equations:
             moved = (at.displacement[part] for part in self.decomposition.parts)
             each_bed = zip(self._beds, responses, moved, strict=True)
             responses = tuple(bed.under(response, own) for bed, response, own in each_bed)
-            external, growth = load.at(at.displacement)
+            external, growth = contact.acting.added(*load.at(at.displacement), at.displacement)
             responses = tuple(map(_following, responses, self.decomposition.meshes))
             external = self.decomposition.on_followed(external)
             growth = growth.followed(self.decomposition)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
+        acting = external + torn.fluid.load
         # What is no more than rounding of strains and of positions is none.
-        unbalanced = beyond(external - internal - bound, ROUNDED * self.stiffness * self._cell)
+        unbalanced = beyond(acting - internal - bound, ROUNDED * self.stiffness * self._cell)
         least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
         open_ = contact.constraint_residual(at.displacement)
         open_ = torn.compliance.added(open_, at.multiplier)
         step, feasible = at.natural_step(caution), torn.law.feasible(at.multiplier)
         mapped = torn.compliance.contact.resolve(feasible, at.multiplier - step * open_, step)
         natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
-        forces = self._with_free(torn, unbalanced, at.multiplier), internal, bound, external
+        forces = self._with_free(torn, unbalanced, at.multiplier), internal, bound, acting
         residuals = relative_residuals(
             torn, natural, feasible.violation(at.multiplier), forces, open_, at.displacement, at.largest,
             self.stiffness,

@@ -400,6 +400,8 @@ class _LoadStepFollower:
 
     def advance(self, now: Progress, fraction: float) -> tuple[Progress, ConvergenceError | None]:
         """Return the progress after a further part of the load, or why that fails. Collective."""
+        contact = self.equations.contact
+        before = contact.feedbacks
         try:
             load = self._load(fraction, *now.origin)
             there = load.at_motions(now.at.motions)
@@ -407,24 +409,25 @@ class _LoadStepFollower:
             found = self.steps.newton.solve(self.equations, load, now.at, self.timer, now.known, moved)
             found = self._settled(load, found)
         except ConvergenceError as failure:
+            contact.feedbacks = before
             return now.costing(Effort.until(failure)), failure
         if self.steps.finer_history:
             return now.costing(found.effort).ending(fraction, found, now.reached), None
         return now.costing(found.effort).reaching(fraction, found, now.since), None
 
-    def _settled(self, load: Loading, found: NonlinearEquilibrium, most: int = 50) -> NonlinearEquilibrium:
-        """Return the equilibrium in which contact has what depends on it. Collective."""
-        newton, contact = self.steps.newton, self.equations.contact
-        for _ in range(most):
-            if contact.settled(found, newton.tolerance):
-                return found
+    def _settled(self, load: Loading, found: NonlinearEquilibrium) -> NonlinearEquilibrium:
+        """Return the equilibrium that agrees with what contact depends on. Collective."""
+        newton, contact, passes = self.steps.newton, self.equations.contact, 1
+        while changed := contact.changed_by(found, newton.tolerance):
+            passes += 1
+            if passes > max(each.most for each in changed):
+                needed, remedy = changed[0].unsettled
+                raise ConvergenceError(
+                    f"{needed}, after {passes - 1} passes it does not: {remedy}", found.effort.history
+                )
             again = newton.solve(self.equations, load, found.evaluation.at, self.timer, found.linearisation)
             found = replace(again, effort=found.effort.followed_by(again.effort))
-        raise ConvergenceError(
-            f"wear must agree with the slip, after {most} passes it does not: take smaller load steps or "
-            "fewer cycles, or prescribe how far surfaces slide",
-            found.effort.history,
-        )
+        return found
 
     def from_near(self, now: Progress, near: Near) -> Progress:
         """Return the progress at the whole load from near its end; none where that fails. Collective."""

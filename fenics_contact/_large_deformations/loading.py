@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import zip_longest
 
@@ -19,6 +19,7 @@ from fenics_contact._large_deformations.rigid_surfaces import (
     tracked_motions,
 )
 from fenics_contact._scene.fields import evaluate
+from fenics_contact._scene.fluids_of_pairs import pressures_of
 from fenics_contact._scene.loads import ThermalStrain
 from fenics_contact._scene.local_axes import free_matrix
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -156,7 +157,7 @@ class Loading:
     `torn`: the system with loads and supports; pressures that follow their surfaces act as on undeformed
     ones; `following`: pressures that follow their surfaces, each with the part of them that acts; `heat`:
     changes of temperature of this rank's subdomains by input node, None where materials feel none; () where
-    there are none.
+    there are none; `fluids`: pressures of fluids in contacts by their names, [force / length²].
     """
 
     torn: TornSystem
@@ -167,6 +168,7 @@ class Loading:
     course: LoadStep = NO_COURSE
     drag: Drag | None = None
     heat: tuple[np.ndarray | None, ...] = ()
+    fluids: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -189,7 +191,8 @@ class Loading:
         torn = _without_tracked(torn, turned)
         with together(decomposition.comm):
             heat = temperature_changes(scene, decomposition)
-        return cls(torn, prescribed, time, following, turned, step, heat=heat)
+        fluids = pressures_of(scene.contacts)
+        return cls(torn, prescribed, time, following, turned, step, heat=heat, fluids=fluids)
 
     def between(self, first: Loading, part: float) -> Loading:
         """Return the load at a part of the way from another one to this. Collective.
@@ -237,7 +240,11 @@ class Loading:
         turned = tuple(each.between(before, part) for each in self.turned)
         pairs = zip_longest(first.heat, self.heat)
         heat = tuple(_between(one, other, part) for one, other in pairs)
-        return Loading(torn, prescribed, time, tuple(weighted), heat=heat).with_surfaces(turned)
+        fluids = {
+            name: (1.0 - part) * first.fluids.get(name, 0.0) + part * end for name, end in self.fluids.items()
+        }
+        mixed_load = Loading(torn, prescribed, time, tuple(weighted), heat=heat, fluids=fluids)
+        return mixed_load.with_surfaces(turned)
 
     def longest_part(self, first: Loading) -> float:
         """Return the part of the way from another load to this in which no rigid surface turns too far.

@@ -14,6 +14,11 @@ import scipy.sparse as sp
 from fenics_contact._base.csr import Csr
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
+from fenics_contact._large_deformations.contact_feedback import (
+    NOTHING_ON_SURFACES,
+    ContactFeedback,
+    OnSurfaces,
+)
 from fenics_contact._large_deformations.loading import Loading, UnsymmetricLowRank, with_added
 from fenics_contact._pairing.inside import InFacets
 from fenics_contact._pairing.sliding.slip import MaterialPoints
@@ -26,6 +31,7 @@ from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.contact_rows import on_copies
 from fenics_contact.feti.decomposition import Decomposition, Rows, Tearing
+from fenics_contact.feti.fluid_front import Front
 from fenics_contact.feti.row_groups import RowGroup
 from fenics_contact.feti.torn import TornSystem, on_contact_rows
 from fenics_contact.qp.reductions import Vector
@@ -33,6 +39,7 @@ from fenics_contact.qp.reductions import Vector
 if TYPE_CHECKING:
     from fenics_contact._pairing.inside import InsideOf
     from fenics_contact._pairing.points import ContactPoints
+    from fenics_contact._pairing.sliding.meeting import Candidates
     from fenics_contact._pairing.sliding.points import SlidingPoints
 
 
@@ -291,6 +298,11 @@ class ContactConfiguration:
     prescribed: np.ndarray
 
     @property
+    def acting(self) -> OnSurfaces:
+        """What acts on surfaces beside multipliers."""
+        return NOTHING_ON_SURFACES
+
+    @property
     def slip_start(self) -> MaterialPoints:
         """The moved points at the start of the load step, in material coordinates of the master."""
         return MaterialPoints.none(0, 0)
@@ -382,15 +394,21 @@ class ContactConfiguration:
 class MovedContact(ContactConfiguration):
     """The contact points of bodies that have moved.
 
-    `points`: where they are; `start`: at the start of the load step, in material coordinates of the master.
+    `points`: where they are; `start`: at the start of the load step, in material coordinates of the master;
+    `on_surfaces`: what acts there beside multipliers.
     """
 
     points: SlidingPoints
     start: MaterialPoints
+    on_surfaces: OnSurfaces = NOTHING_ON_SURFACES
 
     @property
     def slip_start(self) -> MaterialPoints:
         return self.start
+
+    @property
+    def acting(self) -> OnSurfaces:
+        return self.on_surfaces
 
     def from_here(self, multiplier: Vector) -> ContactConfiguration:
         elastic = None
@@ -509,28 +527,16 @@ class MovedContact(ContactConfiguration):
         return self.points.points
 
 
-class NoEarlierWear:
-    """Contact that takes nothing away."""
-
-    def on(self, contact: MovedContact) -> MovedContact:
-        """Return contact that has lost what it had before the load step."""
-        return contact
-
-    def after(self, found: Any, tolerance: float) -> NoEarlierWear:
-        """Return what contact takes away at an equilibrium of Newton's method. Collective."""
-        return self
-
-
 class Contact:
     """Contact at the points of the undeformed bodies: small displacements."""
 
-    #: What it has taken away before the load step, and takes away in it.
-    wear = NoEarlierWear()
+    #: What equilibria change, since the load step before.
+    feedbacks: tuple[ContactFeedback, ...] = ()
 
-    def settled(self, found: Any, tolerance: float) -> bool:
-        """Return whether an equilibrium has the wear of its slip; if not, contact has it now. Collective."""
-        last, self.wear = self.wear, self.wear.after(found, tolerance)
-        return self.wear is last
+    def changed_by(self, found: Any, tolerance: float) -> list[ContactFeedback]:
+        """Return what does not agree with an equilibrium; contact has what does now. Collective."""
+        last, self.feedbacks = self.feedbacks, tuple(each.after(found, tolerance) for each in self.feedbacks)
+        return [new for new, old in zip(self.feedbacks, last, strict=True) if new is not old]
 
     def put_inside(self, places: InFacets) -> None:
         """Put points of pairs with obstacles inside facets of slaves, by key, all others at nodes."""
@@ -571,7 +577,7 @@ class MovingContact(Contact):
         self._sliding = self._at_nodes = SlidingContact.of(
             scene, decomposition.fixed, decomposition.comm, axes=decomposition.axes
         )
-        self._places = scene.points
+        self._places, self.decomposition = scene.points, decomposition
         surfaces = [side for pair in scene.contacts for side in pair.surfaces]
         for side in surfaces:
             hanging = scene.bodies[side.body].mesh.hanging
@@ -590,11 +596,21 @@ class MovingContact(Contact):
         searched = [pair for pair in scene.contacts if not _on_plane(scene, pair)]
         sides = [side for pair in searched for side in pair.surfaces]
         self._obstacles = [obstacle for pair in searched for obstacle in pair.moving]
-        self._facet = min((_facet_size(scene, side) for side in sides), default=np.inf)
+        self._facet = min((facet_size(scene, side) for side in sides), default=np.inf)
 
     def put_inside(self, places: InFacets) -> None:
         """Put points of pairs with obstacles inside facets of slaves, by key, all others at nodes."""
         self._sliding = self._at_nodes.with_inside(places)
+
+    @property
+    def slaves(self) -> tuple[Candidates, ...]:
+        """The slaves of all pairs."""
+        return self._at_nodes.meetings
+
+    def fluid_front(self, scene: Scene) -> Front:
+        """Return the nodes of slaves that fluid may reach. Collective."""
+        nodes = [slave.nodes for slave in self.slaves]
+        return Front.of(scene, self.decomposition.tearing, self._at_nodes.comm, nodes)
 
     def longest_part(self, first: Loading, last: Loading) -> float:
         """Return the part in which what nodes may pass moves by a few facets. Collective."""
@@ -642,7 +658,10 @@ class MovingContact(Contact):
 
     def _on_rows(self, load: Loading, found: SlidingPoints, start: MaterialPoints) -> ContactConfiguration:
         torn = on_contact_rows(load.torn, found.points, load.prescribed)
-        return self.wear.on(MovedContact(torn, load.prescribed, found, start))
+        contact = MovedContact(torn, load.prescribed, found, start)
+        for feedback in self.feedbacks:
+            contact = feedback.on(contact, load)
+        return contact
 
     def _coordinates(self, load: Loading, displacement: Vector) -> np.ndarray:
         """Return where all nodes of contact surfaces are, shape (n_nodes, dim), [length]. Collective."""
@@ -662,7 +681,7 @@ def _on_plane(scene: Scene, pair: ContactPair) -> bool:
     return isinstance(shape, RigidPlane)
 
 
-def _facet_size(scene: Scene, side: Surface) -> float:
+def facet_size(scene: Scene, side: Surface) -> float:
     """Return the usual size of the facets of a surface, [length]."""
     mesh = scene.bodies[side.body].mesh
     area = float(share_areas(mesh, side.name).sum()) / len(mesh.surfaces[side.name])

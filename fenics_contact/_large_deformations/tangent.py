@@ -32,7 +32,7 @@ from fenics_contact.feti.inverse import FactoredOperator, LocalKind, TornInverse
 from fenics_contact.feti.kernel_basis import TornModes
 from fenics_contact.feti.sewing import NOT_SEWN, NotSewn
 from fenics_contact.feti.subdomain import CachedMatrix, LocalOperator, Subdomain
-from fenics_contact.feti.torn import TornSystem
+from fenics_contact.feti.torn import FluidLoad, TornSystem
 from fenics_contact.qp.coarse import CoarseSpace
 
 
@@ -465,7 +465,7 @@ def linearised(
     unbalanced: np.ndarray,
     constraint_residual: np.ndarray,
 ) -> TornSystem:
-    """Return the torn system of increments at a displacement."""
+    """Return the torn system of increments at a displacement; forces out of balance are all its load."""
     subdomains, start = [], 0
     for subdomain, tangent in zip(torn.subdomains, tangents, strict=True):
         part = slice(start, start + subdomain.mesh.size)
@@ -481,7 +481,7 @@ def linearised(
             )
         )  # fmt: skip
         start = part.stop
-    return replace(torn, subdomains=tuple(subdomains), right=constraint_residual)
+    return replace(torn, subdomains=tuple(subdomains), right=constraint_residual, fluid=FluidLoad())
 
 
 def _itself(matrix: sp.csr_matrix) -> sp.csr_matrix:

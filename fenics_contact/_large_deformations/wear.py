@@ -8,13 +8,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from fenics_contact._large_deformations.moving_contact import MovedContact, NoEarlierWear
+from fenics_contact._large_deformations.contact_feedback import ContactFeedback
+from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._large_deformations.moving_contact import MovedContact
 from fenics_contact._large_deformations.newton import NonlinearEquilibrium
 from fenics_contact.feti.point_wear import AtNodes, PointWear, WornClosures
 
 
 @dataclass(frozen=True, eq=False)
-class EarlierWear(NoEarlierWear):
+class EarlierWear(ContactFeedback):
     """What contact has taken away before a load step, and the slip over which it takes more in it.
 
     Newton's method takes the slip as it is; where it has ended that is found anew.
@@ -24,6 +26,10 @@ class EarlierWear(NoEarlierWear):
 
     lost: AtNodes
     slip: AtNodes
+    unsettled = (
+        "wear must agree with the slip",
+        "take smaller load steps or fewer cycles, or prescribe how far surfaces slide",
+    )
 
     @classmethod
     def of(cls, before: Sequence[Any]) -> EarlierWear:
@@ -40,7 +46,7 @@ class EarlierWear(NoEarlierWear):
             slip = AtNodes.of(points, contact.slip)
         return cls(lost, slip)
 
-    def on(self, contact: MovedContact) -> MovedContact:
+    def on(self, contact: MovedContact, load: Loading) -> MovedContact:
         """Return contact that has lost this, and loses more over the slip."""
         torn, points = contact.torn, contact.torn.points
         before = self.lost.on(points)[:, 0]

@@ -10,7 +10,7 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.checks import check_not_negative
 from fenics_contact._scene.fields import OfPosition
-from fenics_contact._scene.part import Around, require_linear, require_surface
+from fenics_contact._scene.part import Around, require_surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 
@@ -22,7 +22,8 @@ class FluidPressure:
 
     It presses both surfaces apart at all contact points that are open and connected, facet by facet, with a
     point where it enters. The front is found by solving again until it stays where it is: from the dry
-    contact on, or from where the load step before left it.
+    contact on, or from where the load step before left it. A slave of a material for large deformations is
+    pressed normal to its surface as it lies, as by `Pressure`, and so are masters of such materials.
 
     Attributes:
         pressure: Pressure of the fluid, ≥ 0, [force / length²].
@@ -58,7 +59,12 @@ class FluidPressure:
         """Reject an unknown inlet, and bodies of nonlinear materials; `body`: that of the slave."""
         if isinstance(self.enters, str):
             require_surface(scene, body, self.enters, "FluidPressure.enters")
-        require_linear(scene, f"the fluid between {place}", "load the wetted surfaces by Pressure elsewhere")
+        if scene.is_nonlinear and not scene.bodies[body].deforms_much:
+            raise InvalidInputError(
+                f"the fluid between {place} needs linear materials in all bodies, or a slave of a material "
+                f"for large deformations, got body {body!r} of another: make the softer body the slave, "
+                "or give NeoHooke or FinitePlasticity"
+            )
 
     @property
     def opens_at(self) -> float:

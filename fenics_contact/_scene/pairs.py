@@ -292,7 +292,7 @@ class ContactPair(PairPart):
         closure: How far the surfaces approach under pressure: `LinearClosure`, `ExponentialClosure`,
             `ClosureTable` or a `ClosureLaw` of your own, for rough surfaces, coats and gaskets. None: contact
             is exact. With one, the gap of a closed point is minus its closure.
-        fluid: Fluid under pressure that enters where contact opens, see `FluidPressure`; small strains only.
+        fluid: Fluid under pressure that enters where contact opens, see `FluidPressure`.
         wear: Law by which the surfaces lose material as they slide, see `Wear`. None: they lose nothing.
         adjust: Slave points whose measured clearance or overlap is at most this, [length], are put in touch
             without strain, or get ``gap`` or ``interference`` if these are given; all others keep the

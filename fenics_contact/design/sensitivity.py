@@ -34,7 +34,7 @@ from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.load_derivatives import work_by_shape
 from fenics_contact.design.objective import Partials
 from fenics_contact.errors import ConvergenceError, InvalidInputError, together
-from fenics_contact.feti.averages import nodal_mean_at, nodal_mean_transposed
+from fenics_contact.feti.averages import nodal_mean_at, nodal_mean_transposed, nodal_sum
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.krylov import Stop
 from fenics_contact.results.deformed_state import DeformedState
@@ -106,13 +106,19 @@ def solve_deformed_adjoint(
 
 
 def _require_differentiable(state: DeformedState) -> None:
-    """Reject free rigid surfaces, and friction that needs more than the start of the load step."""
+    """Reject free rigid surfaces, fluid on other masters, and friction that needs more than the start."""
     torn, contact = state.torn, state.equilibrium.evaluation.contact
     if free := state.equilibrium.evaluation.load.free_tools:
         raise InvalidInputError(
             "derivatives of nonlinear scenes need rigid tools and surfaces whose whole motion is prescribed, "
             f"but that of {sorted(free)} has free components: prescribe what State.rigid_motions() reports"
         )
+    for pair in torn.scene.contacts:
+        if pair.fluids and not all(torn.scene.bodies[side.body].deforms_much for side in pair.surfaces):
+            raise InvalidInputError(
+                "derivatives with fluid need masters of materials for large deformations, that of "
+                f"{pair.place} is of another: give it NeoHooke"
+            )
     if len(torn.frictional) == 0:
         return
     if state.since > 0.0:
@@ -151,6 +157,8 @@ def deformed_contact_by_shape(
         rows = points.slip_rows(start.material_points()) + points.slip_by_start(start)
         by_nodes -= rows.T @ by_slip.ravel()
     result += by_nodes.reshape(result.shape)
+    pressed = contact.acting.pulled_back(state.torn_displacement, fields.displacements[0])
+    result += nodal_sum(torn.decomposition, pressed)
     by_area = bounds_by_area(torn, normal, by_bound) + by_area
     with together(torn.decomposition.comm):
         np.add.at(result, torn.points.slave, bounds_by_place(torn, normal, by_bound))

@@ -94,6 +94,13 @@ class FluidLoad:
     load: np.ndarray | float = 0.0
     wet: np.ndarray | None = None
     pressure: np.ndarray | float = 0.0
+    #: Which nodes of bodies that deform much it has reached, shape (n_nodes,); (0,) for none.
+    marks: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    @property
+    def work(self) -> float:
+        """Its work: none, or NaN, as it depends on the way."""
+        return 0.0 if self.wet is None else np.nan
 
 
 class Unworn:
@@ -401,20 +408,26 @@ class TornSystem:
         """This rank's torn load f, shape (torn_size,), [force]."""
         return np.concatenate([subdomain.load for subdomain in self.subdomains]) + self.fluid.load
 
-    def with_fluid(self, pressure: np.ndarray, wet: np.ndarray) -> TornSystem:
+    def with_fluid(
+        self,
+        pressure: np.ndarray,
+        wet: np.ndarray,
+        at_points: np.ndarray,
+        alone: np.ndarray | float = 0.0,
+    ) -> TornSystem:
         """Return the system with fluid that presses surfaces apart as normal forces do. Collective.
 
-        `pressure`: at each contact point, shape (n_contact,), [force / length²]; `wet`: where it is,
-        (n_contact,).
+        `pressure`: at each contact point, shape (n_contact,), [force / length²]; `wet`: where it is;
+        `at_points`: its forces there, [force]; `alone`: forces on slaves alone, torn, of this rank.
         """
         force = np.zeros(len(self.numbering.owned))
         place = self.numbering.owned_index(self.normal_rows)
-        force[place[place >= 0]] = (pressure * self.points.area)[place >= 0]
+        force[place[place >= 0]] = at_points[place >= 0]
         free = self.free
         if free.count:  # it presses tools that are free to move, too
             on_points = np.asarray(self.numbering.comm.allreduce(free.columns.T @ force))
             free = replace(free, load=free.load + on_points)
-        return replace(self, fluid=FluidLoad(-self.force(force), wet, pressure), free=free)
+        return replace(self, fluid=FluidLoad(alone - self.force(force), wet, pressure), free=free)
 
 
 @naming_arguments

@@ -405,7 +405,12 @@ class PointAreas:
 
         Those of the deformed slave; where its material knows small strains alone, of the undeformed one.
         """
-        return np.where(self.much, self.now, self.before) * self.share
+        return self.pressed * self.share
+
+    @property
+    def pressed(self) -> np.ndarray:
+        """Whole areas to which that stress refers, on which fluid between surfaces presses, shape (n,)."""
+        return np.where(self.much, self.now, self.before)
 
     @property
     def nominal(self) -> np.ndarray:

@@ -1,0 +1,23 @@
+"""A rubber lip on a floor that fluid may enter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fenics_contact import Body, ContactPair, FluidPressure, RigidPlane, Scene, Support, Surface
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import NeoHooke
+
+RUBBER = NeoHooke(5.0, 0.4)
+FLOOR = RigidPlane((0.0, 0.0), (0.0, 1.0))
+
+
+def lip(x: float = 4.0, top: float = -0.12, fluid: FluidPressure | None = None, **more: Any) -> Scene:
+    """A crowned block pressed on a floor; fluid enters from its left."""
+    mesh = rectangle((0.0, 0.0), (x, 1.0), (17, 5))
+    points = mesh.points.copy()
+    points[:, 1] += 0.03 * (points[:, 0] - 1.9) ** 2 * (1.0 - points[:, 1])
+    fluid = fluid or FluidPressure(0.0, "x0", critical="pressure")
+    pair = ContactPair(Surface("lip", "y0"), FLOOR, fluid=fluid, **more)
+    held = [Support("lip", "y1", (0.0, top))]
+    return Scene({"lip": Body(mesh.moved(points), RUBBER)}, held, contacts=[pair])
