@@ -17,7 +17,7 @@ from _site.thumbnails import write_thumbnail
 DEMOS = (
     "hertz_sphere punch_2d cattaneo_mindlin patch_test sheared_block shrink_fit press_fit_edge "
     "bolted_joint five_links orthotropic tooth_flank chain_links snap_fit rubber_seal "
-    "ball_imprint shallow_ironing worn_bush power_module"
+    "ball_imprint shallow_ironing lip_seal worn_bush power_module"
 ).split()
 #: Endings of pictures that show bodies, the best thumbnails first.
 BODIES = ("stress", "temperature", "status")

@@ -83,3 +83,20 @@ def test_a_bed_is_ironed_from_end_to_end(demo: Callable[..., Any], ranks: int) -
     found = [(more["vertical"][step], more["horizontal"][step]) for step in (3, 23, 43)]
     np.testing.assert_allclose(found, IRONING, rtol=1e-3)
     assert np.ptp(more["horizontal"][13:24]) < 5.0, "steady"
+
+
+@on_ranks(1)
+def test_a_lip_seal_drags_least_and_is_as_tight(demo: Callable[..., Any], ranks: int) -> None:
+    result, output, printed = demo("lip_seal", ranks=ranks, timeout=300.0)
+    assert result["ranks"] == ranks
+    assert printed.count("pictures and files in") == 1, "one rank prints"
+    assert {path.stem for path in output.glob("*.png")} == {"profile", "front", "pressure", "stress"}
+    assert list(output.rglob("*.vtm"))
+    more = result["more"]
+    assert more["start"] == pytest.approx(0.854633, rel=1e-4)
+    assert more["least"] == pytest.approx(0.316785, rel=1e-3)
+    assert more["round"] == pytest.approx([0.562851, 0.409598], rel=2e-3)
+    assert more["tight_at"] == [20.0, 15.0, 15.0]
+    slope, quotient = more["gradient"]
+    assert slope == pytest.approx(quotient, rel=1e-5)
+    assert more["dragged"]["ours"] < 0.9 * more["dragged"]["round"]
