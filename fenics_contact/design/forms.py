@@ -41,9 +41,10 @@ Materials = tuple[Material, ...]
 class Density:
     """What is integrated over a body.
 
-    `integrand`: takes displacement, coordinates, stress and the constants (UFL), returns a UFL scalar;
-    `in_space`: whether the stress of plane bodies has the component normal to the plane, too; `degree`:
-    degree of its quadrature on linear cells.
+    `integrand`: takes displacement, coordinates, stress, the constants and the fields of cells (UFL), returns
+    a UFL scalar; `in_space`: whether the stress of plane bodies has the component normal to the plane, too;
+    `degree`: degree of its quadrature on linear cells; `of_cells`: components of the field that is constant
+    on cells, if there is one.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Density:
     constants: int = 0
     in_space: bool = False
     degree: int = 2
+    of_cells: tuple[int, ...] = ()
 
 
 class EveryNode:
@@ -157,7 +159,7 @@ class ShapeForms:
         position, that by the temperature is by these values.
 
         Its constants are those of the density, of the temperature and of the materials; its coefficients are
-        u and those of the temperature.
+        u, the fields of the density, and those of the temperature.
         """
 
         def write() -> Written:
@@ -165,13 +167,14 @@ class ShapeForms:
             x = element.x
             change, numbers, fields = temperature.write(element)
             own = scalar_constants(element, density.constants)
+            known = [ufl.Coefficient(element.cellwise((size,)), count=1) for size in density.of_cells]
             stress_of = stress_in_space if density.in_space else stress_left
             (moved,) = element.in_space(u)
 
             def write_density(material: Material, constants: Constants) -> Expr:
                 with user_code(f"the integrand of {density.name!r}"):
                     stress = stress_of(material, moved, constants, change)
-                    return density.integrand(u, x, stress, *own)
+                    return density.integrand(u, x, stress, *own, *known)
 
             measure = volume_measure(element, density.degree)
             form, constants = integrate(materials, element, write_density, measure)
@@ -181,7 +184,7 @@ class ShapeForms:
                 form = _by_shape(form, element)
             elif by == "temperature":
                 form = ufl.derivative(form, fields[0])
-            return form, (*own, *numbers, *constants), [u, *fields]
+            return form, (*own, *numbers, *constants), [u, *known, *fields]
 
         types = tuple(type(material) for material in materials)
         key = (density, by, materials, element, temperature.key)

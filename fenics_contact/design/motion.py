@@ -386,12 +386,16 @@ Bind = Callable[[Subdomain, Functions, Spaces], "_dolfinx.fem.Form"]
 
 @dataclass(frozen=True, eq=False)
 class BodyIntegral:
-    """∫ of a density over one body of a state."""
+    """∫ of a density over one body of a state.
+
+    `of_cells`: its fields, rows for all cells of the body.
+    """
 
     state: State
     forms: ShapeForms
     density: Density
     body: str
+    of_cells: tuple[np.ndarray, ...] = ()
 
     def __call__(self, *numbers: float) -> float:
         """Integrate with values of the density's constants. Collective."""
@@ -449,7 +453,10 @@ class BodyIntegral:
             parts, mesh = subdomain.material, subdomain.mesh.space.mesh
             template = self.forms.functional(self.density, parts.materials, element, by, temperature)
             points = body.mesh.points[np.sort(subdomain.mesh.nodes)]
-            fields = [*functions, *temperature.fields(mesh, points)]
+            known = [
+                _dolfinx.cell_field(mesh, "of_cells", own[subdomain.mesh.cells]) for own in self.of_cells
+            ]
+            fields = [*functions, *known, *temperature.fields(mesh, points)]
             values = (*numbers, *temperature.numbers, *parts.parameters)
             return template.bind(spaces, values, fields, mesh=mesh, cells=parts.cells)
 

@@ -96,7 +96,7 @@ def finite(name: str, numbers: np.ndarray) -> np.ndarray:
     return numbers
 
 
-def require_linear(state: State, objective: Objective) -> None:
+def require_linear(state: State, objective: object) -> None:
     """Reject an objective that knows linear materials alone."""
     if state.scene.is_nonlinear:
         raise InvalidInputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
@@ -23,11 +24,38 @@ from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.results.deformed_state import AnyState
 
 
+class PathObjective(ABC):
+    """J of all load steps of a path together, such as one of the range of stresses in a cycle.
+
+    `steps`: names of those on which it depends.
+    """
+
+    steps: Sequence[str]
+
+    @abstractmethod
+    def at(self, states: Mapping[str, AnyState], forms: ShapeForms) -> Mapping[str, Objective]:
+        """Return objectives of steps whose values, and derivatives at these states, add up to J's.
+
+        Collective.
+        """
+
+
+class _OfSteps(dict[str, Objective], PathObjective):
+    """J = Σ J_n, by the names of steps."""
+
+    def __init__(self, by_step: Mapping[str, Objective]) -> None:
+        super().__init__(by_step)
+        self.steps = list(by_step)
+
+    def at(self, states: Mapping[str, AnyState], forms: ShapeForms) -> Mapping[str, Objective]:
+        return self
+
+
 class JointProblem(DesignProblem[JointPoint]):
     """A design problem with several states a design."""
 
     problems: dict[str, ShapeProblem]
-    objectives: dict[str, Objective]
+    objectives: Mapping[str, Objective] | PathObjective
 
     @property
     def scene(self) -> Scene:
@@ -266,11 +294,12 @@ class LoadPath(JointProblem):
     active set of its step and a load along the contact points' tangents from the step after. A design costs a
     state and an adjoint for each step, one mesh motion, and one assembly and factorisation of what moved.
 
-    With `FrictionWork` as objective J is the work that friction dissipates in all steps.
+    With `FrictionWork` as objective J is the work that friction dissipates in all steps. What depends on
+    several steps at once is one objective of the path, such as `fatigue.FatigueNorm` of a cycle.
 
     Attributes:
         problems: Name of the step -> its problem, with the loads of the step.
-        objectives: Name of the step -> J_n, for steps that have one.
+        objectives: Name of the step -> J_n, for steps that have one; or the objective of the path.
 
     Example:
         >>> designs = SurfaceDesign("block", "z0", net=(4, 3))  # doctest: +SKIP
@@ -290,7 +319,7 @@ class LoadPath(JointProblem):
         self,
         problem: ShapeProblem,
         steps: Sequence[LoadStep],
-        objectives: Mapping[str, Objective] | None = None,
+        objectives: Mapping[str, Objective] | PathObjective | None = None,
     ) -> None:
         """Apply the steps to the problem's scene, one after the other. Collective.
 
@@ -298,7 +327,8 @@ class LoadPath(JointProblem):
             problem: Scene, designs and tolerance.
             steps: The steps in their order, each with a name of its own; slip of the first is measured from
                 the undeformed state.
-            objectives: Name of the step -> its objective; None for that of the problem in every step.
+            objectives: Name of the step -> its objective, or one of the path; None for that of the problem in
+                every step.
 
         Raises:
             InvalidInputError: If there is no step, two have the same name, an objective is that of no step or
@@ -311,9 +341,10 @@ class LoadPath(JointProblem):
                     "LoadPath needs states of one tolerance, got an adaptive one: give ShapeProblem a number"
                 )
             _check_names(names)
-        self.objectives = _checked(problem.comm, names, objectives or dict.fromkeys(names, problem.objective))
+        self._whole = _checked(problem.comm, names, objectives or dict.fromkeys(names, problem.objective))
         with together(problem.comm):
-            _check_last(names, self.objectives)
+            _check_last(names, self._whole.steps)
+        self.objectives = self._whole
         self.problems: dict[str, ShapeProblem] = {}
         scene, last = problem.scene, problem
         for step in steps:
@@ -353,23 +384,24 @@ class LoadPath(JointProblem):
         """Return J_n(α) of every step that has an objective. Collective."""
         states, forms = self._states.of(alpha), self.forms
         with guarded_user_call(self.comm):
-            given = {name: each.value(states[name], forms) for name, each in self.objectives.items()}
+            objectives = self._whole.at(states, forms)
+            given = {name: each.value(states[name], forms) for name, each in objectives.items()}
             return {name: finite_value(value) for name, value in given.items()}
 
     def value_of(self, alpha: np.ndarray) -> float:
         """Return J(α) alone, without adjoints. Collective."""
         return sum(self.values_of(alpha).values())
 
-    def function(self, objectives: Mapping[str, Objective]) -> LoadPath:
+    def function(self, objectives: Mapping[str, Objective] | PathObjective) -> LoadPath:
         """Return other objectives of the same steps as a function of the designs, for a constraint.
 
         At the design solved last it uses the states and costs the adjoints. Collective.
 
         Args:
-            objectives: Name of the step -> its objective, for some of the steps.
+            objectives: Name of the step -> its objective, for some of the steps; or one of the path.
         """
         other = copy(self)
-        other.objectives = _checked(self.comm, list(self.problems), objectives)
+        other.objectives = other._whole = _checked(self.comm, list(self.problems), objectives)
         other._memory = record_of_values(other._point_at)
         return other
 
@@ -389,15 +421,17 @@ class LoadPath(JointProblem):
     def _point_at(self, alpha: np.ndarray) -> JointPoint:
         """Solve the adjoints from the last step to the first. Collective."""
         states = self._states.of(alpha)
+        with guarded_user_call(self.comm):
+            objectives = self._whole.at(states, self.forms)
         found: dict[str, DesignPoint] = {}
         later = LaterSteps.none(states[list(self.problems)[-1]])
         for name in reversed(self.problems):
             problem, state = self.problems[name], states[name]
-            if not found and name not in self.objectives:
+            if not found and name not in objectives:
                 continue
             own = Partials.of(state, 0.0)
-            if name in self.objectives:
-                own = problem.partials_of(self.objectives[name], state)
+            if name in objectives:
+                own = problem.partials_of(objectives[name], state)
             found[name], whole = problem.differentiated(state, later.added(state, own) if found else own)
             later = later.before(state, whole, found[name].adjoint_multiplier)
         alpha = np.array(alpha, dtype=float)
@@ -439,25 +473,28 @@ def _check_names(names: Sequence[str]) -> None:
         )
 
 
-def _check_last(names: Sequence[str], objectives: Mapping[str, Objective]) -> None:
+def _check_last(names: Sequence[str], known: Sequence[str]) -> None:
     """Check that no step comes after the last objective, on which nothing depends."""
-    if names[-1] not in objectives:
+    if names[-1] not in known:
         raise InvalidInputError(
-            f"the last step needs an objective, got those of {list(objectives)}: leave out later steps"
+            f"the last step needs an objective, got those of {list(known)}: leave out later steps"
         )
 
 
 def _checked(
-    comm: MPI.Comm, names: Sequence[str], objectives: Mapping[str, Objective]
-) -> dict[str, Objective]:
-    """Return the objectives of steps in the order of the steps."""
+    comm: MPI.Comm, names: Sequence[str], given: Mapping[str, Objective] | PathObjective
+) -> PathObjective:
+    """Return the objective of a path, those of steps in the order of the steps."""
     with together(comm):
-        if not isinstance(objectives, Mapping):
+        if not isinstance(given, Mapping | PathObjective):
             raise InvalidInputError(
-                f"LoadPath.objectives must map steps to objectives, got {type(objectives).__name__}"
+                f"LoadPath.objectives must map steps to objectives, got {type(given).__name__}"
             )
-        if not objectives or not set(objectives) <= set(names):
+        known = list(given.steps if isinstance(given, PathObjective) else given)
+        if not known or not set(known) <= set(names):
             raise InvalidInputError(
-                f"LoadPath.objectives must be those of steps {list(names)}, got those of {list(objectives)}"
+                f"LoadPath.objectives must be those of steps {list(names)}, got those of {known}"
             )
-    return {name: objectives[name] for name in names if name in objectives}
+    if isinstance(given, PathObjective):
+        return given
+    return _OfSteps({name: given[name] for name in names if name in given})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -24,7 +24,10 @@ from fenics_contact.design import (
     PressureNorm,
 )
 from fenics_contact.design.adjoint import LaterSteps
+from fenics_contact.design.forms import ShapeForms
+from fenics_contact.design.several import PathObjective
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.results.deformed_state import AnyState
 from tests.design.chains import SOLVER
 from tests.design.load_paths import PathLine, beam, line_of, path_of
 from tests.design.quotients import Patch
@@ -99,6 +102,30 @@ def test_an_objective_of_the_last_step_depends_on_the_steps_before() -> None:
     assert point.value == point.parts["let go"].value
     assert all(np.array_equal(step.alpha, here.alpha) for step in point.parts.values())
     assert np.abs(point.parts["push"].gradient).max() > 1e-3 * np.abs(point.gradient).max()
+
+
+class RangeOfMovement(PathObjective):
+    """By how much a movement differs between two steps: the difference of their objectives."""
+
+    steps = ("push", "back")
+
+    def at(self, states: Mapping[str, AnyState], forms: ShapeForms) -> Mapping[str, Objective]:
+        moved = Movement("block", "y1", (1.0, 0.0))
+        push, back = (moved.value(states[name], forms) for name in self.steps)
+        sign = float(np.sign(push - back))
+        return {"push": sign * moved, "back": -sign * moved}
+
+
+def test_one_objective_may_depend_on_several_steps() -> None:
+    whole = path_of("floor")
+    path = whole.function(RangeOfMovement())
+    here = line_of(path)
+    assert here.slope() == pytest.approx(here.quotient(), rel=1e-5)
+    moved = Movement("block", "y1", (1.0, 0.0))
+    states = whole.states_of(here.alpha)
+    push, back = (moved.value(states[name], path.forms) for name in ("push", "back"))
+    assert path.value_of(here.alpha) == pytest.approx(abs(push - back), rel=1e-12)
+    assert abs(push - back) > 1e-4
 
 
 def test_the_states_are_those_of_load_steps_and_the_value_is_what_friction_dissipates() -> None:
