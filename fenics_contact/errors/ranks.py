@@ -382,7 +382,7 @@ def _communicator(
         comm = comm_of(*arguments, **named)
         if hasattr(comm, "allreduce"):
             return comm
-    except (TypeError, AttributeError) as error:
+    except (TypeError, AttributeError, LookupError) as error:
         cause = error
     names = [name for name in wanted.parameters if name != "self"]
     given = [type(each).__name__ for each in arguments[len(arguments) and "self" in wanted.parameters :]]
