@@ -36,6 +36,7 @@ from fenics_contact import (
     solve_steps,
     write_result,
 )
+from fenics_contact.fatigue import Findley, assess_cycle
 from fenics_contact.output import ResultSeries
 
 comm = MPI.COMM_WORLD
@@ -84,14 +85,19 @@ scene = Scene(
 # grows with the logarithm of the size. The tractions do not know about it: they belong to the measured $P$
 # and $Q$.
 
+# In the end it is sheared back and forth again, which is a cycle.
+
 shifts = {"pressed": 0.0, "sheared a little": 0.0004, "sheared": 0.00075, "sheared more": 0.00105}  # mm
 base = Support("lower", "y0", (0.0, 0.0))
+both = {"sheared back": -0.00105, "sheared again": 0.00105}
 steps = [
     LoadStep(name, supports=[base, Support("upper", "y1", (shift, -0.00205))])
-    for name, shift in shifts.items()
+    for name, shift in (shifts | both).items()
 ]
 with show_progress(comm):
-    states = dict(zip(shifts, solve_steps(ContactProblem(scene, comm, tolerance=1e-6), steps), strict=True))
+    solved = solve_steps(ContactProblem(scene, comm, tolerance=1e-6), steps)
+    *first, back, again = solved
+states = dict(zip(shifts, first, strict=True))
 
 # ## Theory for measured forces
 #
@@ -164,6 +170,58 @@ last = states["sheared"]
 pictures.plot_contact_pressure(last, output / "contact.png", title="Sheared cylinders")
 pictures.plot_stress(last, output / "stress.png", scale=1.0, title="Sheared cylinders")
 
+# ## Fatigue
+#
+# Over the cycle of shear the pressure does not change, and $q$ and the stress $\sigma$ along the surface
+# change their sign. The amplitude of shear on the critical plane, Findley's parameter for $k = 0$, is that of
+# Mohr's circle, with the surface stress of the two ellipses of $q$:
+#
+# $$ \tau_a = \sqrt{\tfrac14 \sigma^2 + q^2}, \qquad
+#    \sigma = -2 \mu p_0 \Bigl[ g(x/a) - \frac{c}{a} g(x/c) \Bigr], \qquad
+#    g(s) = s \mp \sqrt{s^2 - 1} \text{ outside, } s \text{ inside.} $$
+#
+# In the slip zones it is the same everywhere, $\mu p_0 \sqrt{Q/(\mu P)}$; the guide has a page on
+# [fatigue](../docs/guide/fatigue.md).
+#
+# ![Shear amplitude along the surface](../docs/pictures/cattaneo_mindlin_fatigue.png)
+
+
+def of_ellipse(s: np.ndarray) -> np.ndarray:
+    """Return g, the surface stress of an ellipse of shear."""
+    return s - np.sign(s) * np.sqrt(np.maximum(0.0, s**2 - 1))
+
+
+def amplitude(x: np.ndarray, ratio: float) -> np.ndarray:
+    """Return τ_a for shear to and fro of Q/(μP) = ``ratio``, [MPa]."""
+    c = half_width * np.sqrt(1 - ratio)
+    along = of_ellipse(x / half_width) - c / half_width * of_ellipse(x / c)
+    return np.hypot(friction_coefficient * peak * along, theory(x, ratio))
+
+
+def near(points: np.ndarray) -> np.ndarray:
+    """Choose the nodes on the lower surface around the contact."""
+    on_surface = np.isin(np.arange(len(points)), scene.bodies["lower"].mesh.surfaces["y1"])
+    return on_surface & (np.abs(points[:, 0]) < 1.6 * half_width)
+
+
+damage = assess_cycle([first[-1], back, again], Findley(0.0), ["lower"], where=near)
+surface = near(damage.points["lower"])
+along = damage.points["lower"][surface, 0]
+shear = damage.planes["lower"].parameter[surface]
+ratio = found["sheared more"][0]
+slipping = friction_coefficient * peak * np.sqrt(ratio)
+x = np.linspace(-1.6 * half_width, 1.6 * half_width, 801)
+pictures.plot_curves(
+    {"nodes": (np.sort(along), shear[np.argsort(along)])},
+    output / "fatigue.png",
+    xlabel="x (mm)",
+    ylabel="shear amplitude (MPa)",
+    reference={f"theory, Q = ±{ratio:.2f} μP": (x, amplitude(x, ratio))},
+    title="Fatigue of sheared cylinders",
+    comm=comm,
+)
+off = np.sqrt(np.mean((shear - amplitude(along, ratio)) ** 2)) / slipping
+
 # ## Files for ParaView
 #
 # The steps one after the other: open `shear.pvd`.
@@ -183,6 +241,8 @@ record = {
     "stick_half_width": [values[1] for values in found.values()],
     "stick_half_width_theory": [values[2] for values in found.values()],
     "largest_error": error,
+    "shear_amplitude": damage.largest,
+    "shear_amplitude_theory": slipping,
 }
 write_result(last, output, more=record)
 imbalance = max(state.balance().imbalance for state in states.values())
@@ -198,13 +258,16 @@ if comm.rank == 0:
     print("              computed     theory      error")
     for ratio, measured, exact in found.values():
         print(f"  {ratio:6.4f} {measured:13.4f} {exact:10.4f} {measured / exact - 1:10.2%}")
+    print(f"  shear to and fro: largest amplitude {damage.largest:.4f} MPa, theory {slipping:.4f} MPa")
     print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
     print(f"pictures and files in {output}/")
 
-# Stick width to 2 % in all three steps. Reactions and forces of contact balance, forces and moments, to
-# rounding.
+# Stick width and largest shear amplitude to 2 %, and that of all nodes to 3 % (rms), as meshes round off the
+# edges. Reactions and forces of contact balance, forces and moments, to rounding.
 
 assert error < 0.02
+assert abs(damage.largest / slipping - 1) < 0.02
+assert off < 0.03
 assert imbalance < 1e-9
 
 # ## What to try next

@@ -37,11 +37,11 @@ Long runs: show_progress, Checkpoint, CheckpointError, interruptible, Interrupte
 
 Tests of material models: check_hyperelastic, check_history_material
 
-Public modules with more: `materials`, `heat` (through bodies and contacts), `gallery` (meshes of simple
-bodies), `readers` (gmsh, CAD, dolfinx, meshio), `decks` (of CalculiX and Abaqus), `mesh`, `shapes` (true
-surfaces), `design` (objectives, constraints, optimisers), `results` (what states consist of), `pictures`,
-`output` (files), `study` (what accuracy costs), `errors`, `theory` (contacts known by formula), `qp` (dual
-solvers) and `feti` (subdomains).
+Public modules with more: `materials`, `heat` (through bodies and contacts), `fatigue` (of contact edges),
+`gallery` (meshes of simple bodies), `readers` (gmsh, CAD, dolfinx, meshio), `decks` (of CalculiX and Abaqus),
+`mesh`, `shapes` (true surfaces), `design` (objectives, constraints, optimisers), `results` (what states
+consist of), `pictures`, `output` (files), `study` (what accuracy costs), `errors`, `theory` (contacts known
+by formula), `qp` (dual solvers) and `feti` (subdomains).
 """
 
 from __future__ import annotations
@@ -165,8 +165,8 @@ __version__ = "0.3.0"
 
 #: Public modules.
 _ROOMS = (
-    "decks design errors feti gallery heat materials mesh output pictures qp readers results shapes study "
-    "theory"
+    "decks design errors fatigue feti gallery heat materials mesh output pictures qp readers results shapes "
+    "study theory"
 ).split()
 
 #: Modules of the names that users take from here.

@@ -63,6 +63,7 @@ FLOORS = [
     [
         Room("_adaptive", "a quantity to an accuracy", "model"),
         Room("_wear", "wear over cycles", "numbers"),
+        Room("fatigue", "critical planes of cycles", "model"),
     ],
     [Room("heat", "through bodies and contacts, from friction, and what it does to contact", "model")],
     [

@@ -28,8 +28,8 @@ from _site import docstrings, signatures
 PACKAGE = fenics_contact.__name__
 #: The front and the public modules, as a user meets them.
 ORDER = (
-    "fenics_contact materials heat gallery readers decks mesh shapes results design pictures output study "
-    "theory errors qp feti"
+    "fenics_contact materials heat gallery readers decks mesh shapes results design fatigue pictures output "
+    "study theory errors qp feti"
 ).split()
 #: Names that the reference uses and does not describe: other libraries', and the standard library's.
 OUTSIDE = [

@@ -19,8 +19,8 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
         {"hertz", "stress", "pressure", "decomposition"},
     ),
     "cattaneo_mindlin": (
-        {"stick_half_width": [0.811537, 0.613885, 0.381714]},
-        {"traction", "contact", "stress"},
+        {"stick_half_width": [0.811537, 0.613885, 0.381714], "shear_amplitude": 0.100768},
+        {"traction", "contact", "stress", "fatigue"},
     ),
     "shrink_fit": (
         {"pressure": 58.9595, "torque_limit": 33340.8},

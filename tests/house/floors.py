@@ -17,7 +17,7 @@ FLOORS = [
     {"results"},
     {"_equilibrium"},
     {"design"},
-    {"_adaptive", "_wear"},
+    {"_adaptive", "_wear", "fatigue"},
     {"heat"},
     {"_scene_file", "output", "pictures", "_responses"},
     {"_page", "decks", "study"},

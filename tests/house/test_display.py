@@ -118,6 +118,15 @@ from fenics_contact.design import (
 )
 from fenics_contact.design.adjoint import linearise_face, solve_adjoint
 from fenics_contact.design.remeshed import Remeshing
+from fenics_contact.fatigue import (
+    FatemiSocie,
+    FatigueNorm,
+    Findley,
+    LifeCurve,
+    SmithWatsonTopper,
+    assess_cycle,
+    ruiz_parameters,
+)
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.heat import (
     ConductanceTable,
@@ -185,7 +194,7 @@ from tests.design.blocks import block_on_floor, designs_of
 from tests.large_deformations.scenes import pressed, rounded
 from tests.scenes import partitions
 
-FACES = ("materials", "mesh", "results", "design", "heat")
+FACES = ("materials", "mesh", "results", "design", "heat", "fatigue")
 MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
@@ -285,6 +294,11 @@ def objects() -> dict[str, Any]:
     ]  # fmt: skip
     roots.append(solve_scene(pressed(rounded(2), 0.1), MPI.COMM_SELF))
     roots += heated(contact, state)
+    roots += [
+        FatigueNorm("block", "z0", Findley(0.3), ("push", "pull", "push")), LifeCurve([(1.0, -0.1)]),
+        assess_cycle([state] * 3, Findley(0.3)), ruiz_parameters([state] * 3), FatemiSocie(0.3, 1.0),
+        SmithWatsonTopper(),
+    ]  # fmt: skip
     found: dict[str, Any] = {}
     for root in roots:
         _collect(root, found)
