@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from fenics_contact._base.checks import checked
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.fatigue.circles import Circles, smallest_circles
-from fenics_contact.materials.elastic import require_positive
+from fenics_contact._scene.checks import check_not_negative, check_positive
+from fenics_contact.fatigue.circles import smallest_circles
 from fenics_contact.results.fields import COMPONENTS
 
 #: P and its derivatives by the amplitude and by the largest normal stress.
@@ -41,24 +41,13 @@ class Criterion(ABC):
         """Return P, which does not fall with the amplitude, and its derivatives."""
 
 
-def _require_weight(name: str, value: float) -> None:
-    if not (np.isfinite(value) and value >= 0.0):
-        raise InvalidInputError(
-            f"{name} must be at least 0, got {value!r}: give the weight of the normal stress, such as 0.3"
-        )
-
-
 @dataclass(frozen=True)
 @checked()
 class Findley(Criterion):
     """P = τ_a + k max σ_n of the shear stress, [force / length²], for many cycles (Findley 1959).
 
     Attributes:
-        k: Weight of the normal stress, at least 0, from two tests, such as tension and torsion.
-
-    Example:
-        >>> Findley(k=0.3)
-        Findley(k=0.3)
+        k: Weight of the normal stress, at least 0, by tests of two kinds.
     """
 
     of_strain = False
@@ -67,7 +56,7 @@ class Findley(Criterion):
 
     def __post_init__(self) -> None:
         """Check k."""
-        _require_weight("Findley.k", self.k)
+        check_not_negative("Findley.k", self.k, "give the weight of the normal stress, such as 0.3")
 
     def combined(self, amplitude: np.ndarray, normal: np.ndarray) -> Combined:
         """Return τ_a + k max σ_n."""
@@ -109,8 +98,8 @@ class FatemiSocie(Criterion):
 
     def __post_init__(self) -> None:
         """Check the constants."""
-        _require_weight("FatemiSocie.k", self.k)
-        require_positive("FatemiSocie.yield_stress", self.yield_stress, "give σ_y in force per area")
+        check_not_negative("FatemiSocie.k", self.k, "give the weight of the normal stress, such as 0.5")
+        check_positive("FatemiSocie.yield_stress", self.yield_stress, "give σ_y in force per area")
 
     def combined(self, amplitude: np.ndarray, normal: np.ndarray) -> Combined:
         """Return Δγ/2 (1 + k σ / σ_y)."""
@@ -138,51 +127,47 @@ def plane_rows(normals: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class OnPlanes:
-    """What a cycle does on planes at points: arrays of shape (n_points, n_planes)."""
+    """What a cycle of stresses and strains does on planes at points: arrays of shape (n_points, n_planes).
+
+    `cycle`: shape (2, n_states, n_points, 6); `rows`: of `plane_rows`, shape (n_points or 1, n_planes, 3, 6).
+    """
 
     criterion: Criterion
+    cycle: np.ndarray
     rows: np.ndarray
-    paths: np.ndarray
-    circles: Circles
-    normal: np.ndarray
-    state: np.ndarray
 
-    @classmethod
-    def of(cls, criterion: Criterion, cycle: np.ndarray, rows: np.ndarray) -> OnPlanes:
-        """Evaluate a cycle of stresses and strains, shape (2, n_states, n_points, 6).
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Normal stresses of all states."""
+        return _components(self.cycle[0], self.rows[..., :1, :])[..., 0]
 
-        `rows`: see `plane_rows`, shape (n_points or 1, n_planes, 3, 6).
-        """
-        normals = _components(cycle[0], rows[..., :1, :])[..., 0]
-        paths = _components(cycle[int(criterion.of_strain)], criterion.path(rows))
-        paths = paths.reshape(len(paths), normals[0].size, -1)
-        circles, state = smallest_circles(paths), normals.argmax(axis=0)
-        return cls(criterion, rows, paths, circles, normals.max(axis=0), state)
+    @cached_property
+    def circles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes, and their derivatives by the points of the paths, (n_states, n_points, n_planes, d)."""
+        paths = _components(self.cycle[int(self.criterion.of_strain)], self.criterion.path(self.rows))
+        radius, slope = smallest_circles(paths.reshape(len(paths), -1, paths.shape[-1]))
+        return radius.reshape(paths.shape[1:3]), slope.reshape(paths.shape)
 
     @property
-    def amplitude(self) -> np.ndarray:
-        """Amplitudes a."""
-        return np.sqrt(self.circles.square).reshape(self.normal.shape)
-
-    @property
-    def parameter(self) -> np.ndarray:
-        """P."""
-        return self.criterion.combined(self.amplitude, self.normal)[0]
+    def combined(self) -> Combined:
+        """P and its derivatives by amplitudes and largest normal stresses."""
+        return self.criterion.combined(self.circles[0], self.normals.max(axis=0))
 
     def pulled_back(self, weights: np.ndarray) -> np.ndarray:
-        """Return the derivatives of Σ weights P by the cycle, shape (2, n_states, n_points, 6).
+        """Return the derivatives of Σ weights P by the cycle, of its shape.
 
         Where several states have the largest normal stress that by the first of them.
         """
-        shape, path = self.normal.shape, self.criterion.path(self.rows)
-        _, by_amplitude, by_normal = self.criterion.combined(self.amplitude, self.normal)
-        by_path = self.circles.by_points(self.paths).reshape(len(self.paths), *shape, -1)
-        by_path *= (weights * by_amplitude)[..., None]
-        chosen = np.where(np.arange(len(by_path))[:, None, None] == self.state, weights * by_normal, 0.0)
-        found = np.zeros((2, len(by_path), shape[0], 6))
-        found[0] = np.einsum("nkm,kmc->nkc", chosen, np.broadcast_to(self.rows[..., 0, :], (*shape, 6)))
-        path = np.broadcast_to(path, (*shape, *path.shape[2:]))
-        found[int(self.criterion.of_strain)] += np.einsum("nkmd,kmdc->nkc", by_path, path)
+        (_, by_amplitude, by_normal), path = self.combined, self.criterion.path(self.rows)
+        largest = np.arange(len(self.normals))[:, None, None] == self.normals.argmax(axis=0)
+        chosen, by_path = (
+            largest * (weights * by_normal),
+            (weights * by_amplitude)[..., None] * self.circles[1],
+        )
+        found, strain = np.zeros_like(self.cycle), int(self.criterion.of_strain)
+        shape = by_path.shape[1:]
+        found[0] = np.einsum("nkm,kmc->nkc", chosen, np.broadcast_to(self.rows[..., 0, :], (*shape[:2], 6)))
+        found[strain] += np.einsum("nkmd,kmdc->nkc", by_path, np.broadcast_to(path, (*shape, 6)))
         return found
 
 

@@ -87,42 +87,31 @@ def assess_cycle(
     if not set(names) <= set(scene.deforming):
         raise InvalidInputError(f"bodies must be some of {list(scene.deforming)}, got {names}: list them")
     for name in names:
-        body, stress = scene.bodies[name], _stress_of(states, name, opening)
-        chosen, found = np.asarray(where(body.mesh.points)), np.full((body.mesh.n_nodes, 6), np.nan)
+        mesh, stress = scene.bodies[name].mesh, closed_cycle(states, name, opening, State.gather_nodal_stress)
+        chosen, found = np.asarray(where(mesh.points)), np.full((mesh.n_nodes, 6), np.nan)
         if chosen.shape != found[:, 0].shape or not chosen.any():
             raise InvalidInputError(f"where must choose nodes of {name!r}, got none: check its coordinates")
-        for material, own in zip(body.materials, stress.swapaxes(0, 1), strict=True):
+        for material, own in zip(scene.bodies[name].materials, stress.swapaxes(0, 1), strict=True):
             nodes = np.flatnonzero(chosen & np.isfinite(own[0, :, 0, 0]))
-            values = _by_ranks(states[0], criterion, own[:, nodes], (material, name, spacing))
+            values, mine = np.zeros((len(nodes), 6)), slice(states[0].comm.rank, None, states[0].comm.size)
+            part = own[:, nodes[mine]]
+            strain = hookean_strain(part, material, name) if criterion.of_strain else None
+            at = find_critical_planes(criterion, part, strain, spacing=spacing)
+            values[mine] = np.column_stack([at.parameter, at.normal, at.amplitude, at.normal_stress])
+            values = states[0].comm.allreduce(values)
             larger = ~(found[nodes, 0] >= values[:, 0])
             found[nodes[larger]] = values[larger]
         planes[name] = CriticalPlanes(found[:, 0], found[:, 1:4], found[:, 4], found[:, 5])
     return CycleFatigue(criterion, planes, {name: scene.bodies[name].mesh.points for name in names})
 
 
-def _by_ranks(
-    state: State, criterion: Criterion, cycle: np.ndarray, of: tuple[object, str, float]
+def closed_cycle(
+    states: Sequence[State], body: str, opening: float, of: Callable[[State, str], np.ndarray]
 ) -> np.ndarray:
-    """Return parameter, normal, amplitude, normal stress, (n, 6); each rank searches a part. Collective."""
-    values, (material, name, spacing) = np.zeros((cycle.shape[1], 6)), of
-    mine = cycle[:, state.comm.rank :: state.comm.size]
-    strain = hookean_strain(mine, material, name) if criterion.of_strain else None
-    found = find_critical_planes(criterion, mine, strain, spacing=spacing)
-    parts = found.parameter, found.normal, found.amplitude, found.normal_stress
-    values[state.comm.rank :: state.comm.size] = np.column_stack(parts)
-    return np.asarray(state.comm.allreduce(values))
+    """Return the stresses of a body in all states of a cycle, which must end where it begins. Collective.
 
-
-def _stress_of(states: Sequence[State], body: str, opening: float) -> np.ndarray:
-    """Return the stresses of a closed cycle at nodes, (n_states, n_materials, n_nodes, 3, 3). Collective."""
-    check_states(states)
-    stress = np.stack([state.gather_nodal_stress(body) for state in states])
-    check_closed(stress, body, opening)
-    return stress
-
-
-def check_states(states: Sequence[State]) -> None:
-    """Reject what is no cycle of states of one mesh."""
+    `of`: takes state and body, returns stresses, shape (..., 3, 3).
+    """
     if len(states) < 3:
         raise InvalidInputError(
             f"a cycle needs at least three states, got {len(states)}: it ends where it begins, such as push, "
@@ -136,10 +125,7 @@ def check_states(states: Sequence[State]) -> None:
                 f"states of a cycle need one mesh, got another in state {number} than in the first: solve "
                 "load steps of one scene by solve_steps"
             )
-
-
-def check_closed(stress: np.ndarray, body: str, opening: float) -> None:
-    """Reject a cycle that does not end where it begins, by its stresses, (n_states, ..., 3, 3)."""
+    stress = np.stack([of(state, body) for state in states])
     away = np.nan_to_num(np.abs(stress - stress[0])).reshape(len(stress), -1).max(axis=1)
     if away[-1] > opening * away.max():
         raise InvalidInputError(
@@ -147,6 +133,7 @@ def check_closed(stress: np.ndarray, body: str, opening: float) -> None:
             f"{away[-1] / away.max():.1%} of their largest change away, allowed are {opening:.1%}: add the "
             "step back to the first, leave out the first cycle, in which friction settles, or allow more"
         )
+    return stress
 
 
 def hookean_strain(stress: np.ndarray, material: object, body: str) -> np.ndarray:
@@ -203,7 +190,8 @@ def ruiz_parameters(states: Sequence[State], pair: int | str = 0, *, opening: fl
     scene = states[0].scene
     number = pair_number(scene.contacts, pair)
     slave, contacts = scene.contacts[number].slave.body, [state.contact for state in states]
-    stress, mine, points = _stress_of(states, slave, opening), contacts[0].on_pair(number), contacts[0].points
+    stress = closed_cycle(states, slave, opening, State.gather_nodal_stress)
+    mine, points = contacts[0].on_pair(number), contacts[0].points
     moved = [np.einsum("na,nad->nd", each.total_slip, points.tangents)[mine] for each in contacts]
     slip, along = np.zeros(len(mine)), points.tangents[mine, 0]
     for way in (end - start for k, start in enumerate(moved) for end in moved[k + 1 :]):

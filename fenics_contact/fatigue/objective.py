@@ -17,7 +17,7 @@ from fenics_contact.design.objectives import require_exponent
 from fenics_contact.design.several import PathObjective
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.fatigue.criteria import Criterion, OnPlanes, plane_rows
-from fenics_contact.fatigue.cycle import check_closed, check_states, hookean_strain
+from fenics_contact.fatigue.cycle import closed_cycle, hookean_strain
 from fenics_contact.fatigue.planes import chunks, half_sphere
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.results.at_points import QuadraturePoints
@@ -74,13 +74,13 @@ class FatigueNorm(PathObjective):
     def at(self, states: Mapping[str, AnyState], forms: ShapeForms) -> Mapping[str, Objective]:
         """Return the share of each step; that of the last has the value. Collective."""
         cycle = [states[name] for name in self.steps]
-        check_states(cycle)
         require_body(cycle[0], "FatigueNorm", self.body)
         require_linear(cycle[0], self)
         body = cycle[0].scene.bodies[self.body]
         cells = self._cells(body.mesh)
-        stress = np.stack([state.gather_stress(self.body)[cells] for state in cycle])
-        check_closed(stress, self.body, self.opening)
+        stress = closed_cycle(
+            cycle, self.body, self.opening, lambda state, name: state.gather_stress(name)[cells]
+        )
         size = QuadraturePoints(body, np.zeros_like(body.mesh.points)).weights.sum(axis=1)[cells]
         largest, by_stress = self._of_cells(body, cells, stress)
         value, by_largest = _norm(largest[None], size / size.sum(), self.p)
@@ -116,8 +116,8 @@ class FatigueNorm(PathObjective):
             for part in chunks(len(mine), len(stress) * rows.shape[1]):
                 own, sigma = mine[part], stress[:, mine[part]]
                 strain = hookean_strain(sigma, material, self.body) if self.criterion.of_strain else sigma
-                on = OnPlanes.of(self.criterion, components_of(np.stack([sigma, strain])), rows)
-                sizes = np.maximum(on.parameter, 0.0)
+                on = OnPlanes(self.criterion, components_of(np.stack([sigma, strain])), rows)
+                sizes = np.maximum(on.combined[0], 0.0)
                 value[own], weights = _norm(sizes, np.full(sizes.shape[1], 1.0 / sizes.shape[1]), self.q)
                 by_stress[:, own], by_strain = on.pulled_back(weights)
                 if self.criterion.of_strain:  # Hooke's law is its own transpose

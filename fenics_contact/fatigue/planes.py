@@ -115,23 +115,23 @@ def _searched(
     """
 
     def on(normals: np.ndarray) -> OnPlanes:
-        return OnPlanes.of(criterion, cycle, plane_rows(normals))
+        return OnPlanes(criterion, cycle, plane_rows(normals))
 
-    best = _highest(on(net[None]).parameter, net)
-    value, steps = on(best).parameter, np.full(best.shape[:2], 0.5 * step)
+    best = _highest(on(net[None]).combined[0], net)
+    value, steps = on(best).combined[0], np.full(best.shape[:2], 0.5 * step)
     every = np.arange(len(best))[:, None]
     for turn in range(rounds):
         if turn == together:
             first = value.argmax(axis=1)[:, None]
             best, value, steps = best[every, first], value[every, first], steps[every, first]
         around = _around(best, steps, turn)
-        tried = on(around.reshape(len(best), -1, 3)).parameter.reshape(around.shape[:3])
+        tried = on(around.reshape(len(best), -1, 3)).combined[0].reshape(around.shape[:3])
         way, highest = tried.argmax(axis=2), tried.max(axis=2)
         moved = np.take_along_axis(around, way[..., None, None], axis=2)[:, :, 0]
         best = np.where((highest > value)[..., None], moved, best)
         value, steps = np.maximum(highest, value), np.where(highest > value, steps, 0.5 * steps)
     found = on(best)
-    return found.parameter[:, 0], best[:, 0], found.amplitude[:, 0], found.normal[:, 0]
+    return found.combined[0][:, 0], best[:, 0], found.circles[0][:, 0], found.normals.max(axis=0)[:, 0]
 
 
 def _highest(values: np.ndarray, net: np.ndarray, starts: int = 4) -> np.ndarray:

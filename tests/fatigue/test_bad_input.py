@@ -45,9 +45,9 @@ def closed(*loads: float) -> list[State]:
 
 
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "k": (lambda: Findley(-0.1), "Findley.k must be at least 0, got -0.1: give the weight"),
-    "yield": (lambda: FatemiSocie(0.3, 0.0), "FatemiSocie.yield_stress must be a positive number, got 0.0"),
-    "k of strain": (lambda: FatemiSocie(np.nan, 1.0), "FatemiSocie.k must be at least 0, got nan"),
+    "k": (lambda: Findley(-0.1), "Findley.k must be .*-0.1"),
+    "yield": (lambda: FatemiSocie(0.3, 0.0), "FatemiSocie.yield_stress must be .*0.0"),
+    "k of strain": (lambda: FatemiSocie(np.nan, 1.0), "FatemiSocie.k must be .*nan"),
     "life": (lambda: LifeCurve([(10.0, 0.1)]), "pairs of A > 0 and b < 0, got .*: try"),
     "no life": (lambda: LifeCurve([]), "pairs of A > 0 and b < 0"),
     "planes": (lambda: find_critical_planes(FINDLEY, STRESS, spacing=30.0), "angle is up to 21.2 deg"),
