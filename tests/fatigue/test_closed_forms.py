@@ -126,8 +126,9 @@ def by_trial(path: np.ndarray) -> float:
 
 
 def test_circles_are_the_smallest_of_all() -> None:
-    paths = np.random.default_rng(0).standard_normal((7, 60, 2))
-    paths[:, 40:, 1] *= 1e-3
+    paths = np.random.default_rng(0).standard_normal((11, 150, 2))
+    paths[:, 100:] /= np.linalg.norm(paths[:, 100:], axis=2, keepdims=True) + 0.01
+    paths[:, 140:, 1] *= 1e-3
     radius, slope = smallest_circles(paths)
     np.testing.assert_allclose(radius, [by_trial(path) for path in paths.swapaxes(0, 1)])
     assert set(np.count_nonzero(slope.any(axis=2), axis=0)) == {2, 3}
