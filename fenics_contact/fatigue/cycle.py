@@ -67,7 +67,8 @@ def assess_cycle(
     """Return the critical planes at the nodes of bodies, on and below surfaces. Collective.
 
     Stresses are those of `State.gather_nodal_stress`. Strains are those of linear, isotropic materials, by
-    Hooke's law, without what heat adds. Where materials meet, that with the larger parameter counts.
+    Hooke's law, without what heat adds. Where materials meet, that with the larger parameter counts. Bodies
+    must not turn far: planes are taken as those of the undeformed body.
 
     Args:
         states: One closed cycle, the last state like the first. With friction the first cycle rarely closes.

@@ -9,13 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from fenics_contact.design import FrictionWork
+from fenics_contact import ContactProblem, ShapeProblem
+from fenics_contact.design import FrictionWork, LoadPath
 from fenics_contact.fatigue import FatigueNorm, Findley, find_critical_planes
 from fenics_contact.fatigue.criteria import OnPlanes
-from tests.design.load_paths import PathLine
+from tests.design.chains import SOLVER
+from tests.design.load_paths import SCENES, PathLine, line_of, loaded, moved
 from tests.design.quotients import Patch
 from tests.fatigue.pushed import CRITERIA, CYCLE, line, path_of
+from tests.scenes import partitions
 
 CLAIM = [pytest.mark.slow, pytest.mark.claim]
 
@@ -32,6 +36,26 @@ def test_the_gradient_by_the_shape_of_the_contact_is_that_of_differences(name: s
     assert value == here.problem.value_of(here.alpha) > 0.0
     assert here.slope() == pytest.approx(here.quotient(), rel=1e-6)
     assert abs(here.slope()) > 0.1 * np.linalg.norm(gradient)
+
+
+@pytest.mark.slow
+@pytest.mark.claim
+@pytest.mark.parametrize("name", ["mortar", "space, mortar"])
+def test_so_is_that_between_bodies_by_mortar_and_in_space(name: str) -> None:
+    scene = SCENES[name]()
+    body, upwards = ("block", "y") if scene.dim == 2 else ("upper", "z")
+    loads = [(name, (push, *[0.1] * (scene.dim - 2), -2.0)) for name, push in TURNS]
+    contact = ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=SOLVER)
+    norm = FatigueNorm(body, f"{upwards}0", CRITERIA["Fatemi, Socie"], CYCLE, opening=0.5)
+    whole = ShapeProblem(contact, moved(scene), FrictionWork())
+    here = replace(line_of(LoadPath(whole, loaded(body, f"{upwards}1", loads, scene), norm)), step=1e-6)
+    # On longer ways planes change the state of their largest normal stress, of two that are nearly the same.
+    assert here.slope() == pytest.approx(here.quotient(), rel=1e-6)
+    assert abs(here.slope()) > 0.01 * np.linalg.norm(here.problem(here.alpha)[1])
+
+
+#: Pushes of load steps, pressed first.
+TURNS = (("press", 0.0), ("push", 0.3), ("pull", -0.3), ("push again", 0.3))
 
 
 @pytest.mark.slow
