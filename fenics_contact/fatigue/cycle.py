@@ -91,7 +91,10 @@ def assess_cycle(
         mesh, stress = scene.bodies[name].mesh, closed_cycle(states, name, opening, State.gather_nodal_stress)
         chosen, found = np.asarray(where(mesh.points)), np.full((mesh.n_nodes, 6), np.nan)
         if chosen.shape != found[:, 0].shape or not chosen.any():
-            raise InvalidInputError(f"where must choose nodes of {name!r}, got none: check its coordinates")
+            raise InvalidInputError(
+                f"where must return a mark for each of {mesh.n_nodes} nodes of {name!r}, true for some, got "
+                f"shape {chosen.shape}, {np.count_nonzero(chosen)} true: compare coordinates"
+            )
         for material, own in zip(scene.bodies[name].materials, stress.swapaxes(0, 1), strict=True):
             nodes = np.flatnonzero(chosen & np.isfinite(own[0, :, 0, 0]))
             values, mine = np.zeros((len(nodes), 6)), slice(states[0].comm.rank, None, states[0].comm.size)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from ufl.core.expr import Expr
 
-from fenics_contact._base.checks import checked
+from fenics_contact._base.checks import check_count, checked
 from fenics_contact._scene.body import Body
 from fenics_contact.design.forms import Density, ShapeForms
 from fenics_contact.design.motion import BodyIntegral, require_body
@@ -47,7 +47,7 @@ class FatigueNorm(PathObjective):
         opening: See `assess_cycle`.
 
     Raises:
-        InvalidInputError: If an exponent is out of range; there is no such body or surface; or as of
+        InvalidInputError: If a number is out of range, there is no such body or surface, or as of
             `assess_cycle`.
 
     Example:
@@ -66,9 +66,10 @@ class FatigueNorm(PathObjective):
     opening: float = 0.02
 
     def __post_init__(self) -> None:
-        """Check the exponents and the net of planes."""
+        """Check exponents, layers and the net of planes."""
         require_exponent("FatigueNorm", self.p)
         require_exponent("FatigueNorm", self.q)
+        check_count(self.layers, "FatigueNorm.layers")
         half_sphere(self.spacing)
 
     def at(self, states: Mapping[str, AnyState], forms: ShapeForms) -> Mapping[str, Objective]:
@@ -101,7 +102,7 @@ class FatigueNorm(PathObjective):
                 f"FatigueNorm.surface must be one of {sorted(mesh.surfaces)}, got {self.surface!r}"
             )
         near = np.isin(np.arange(mesh.n_nodes), mesh.surfaces[self.surface])
-        for _ in range(max(self.layers, 1)):
+        for _ in range(self.layers):
             cells = np.flatnonzero(near[mesh.cells].any(axis=1))
             near[mesh.cells[cells]] = True
         return cells

@@ -54,6 +54,7 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
     "planes of a norm": (
         lambda: FatigueNorm("a", "b", FINDLEY, CYCLE, spacing=45.0), "from 0.5 to 15 degrees, got 45.0"
     ),
+    "layers": (lambda: FatigueNorm("a", "b", FINDLEY, CYCLE, layers=0), "layers must be an integer of at"),
     "exponent": (lambda: FatigueNorm("a", "b", FINDLEY, CYCLE, p=1.0), "FatigueNorm.p must be from 2 to 100"),
     "strain": (
         lambda: find_critical_planes(SmithWatsonTopper(), STRESS), "SmithWatsonTopper needs strains, got"
@@ -70,7 +71,7 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "bodies": (lambda: assess_cycle(closed(1.0, -1.0, 1.0), FINDLEY, ["rod"]), r"bar'\], got \['rod'\]"),
     "nowhere": (
-        lambda: assess_cycle(closed(1.0, -1.0, 1.0), FINDLEY, where=lambda x: x[:, 0] > 9.0), "choose nodes"
+        lambda: assess_cycle(closed(1.0, -1.0, 1.0), FINDLEY, where=lambda x: x[:, 0] > 9.0), "9,., 0 true"
     ),
     "pairs": (lambda: ruiz_parameters(closed(1.0, -1.0, 1.0)), "the scene has no pair"),
     "nothing": (lambda: assess_cycle([], FINDLEY), "assess_cycle"),
