@@ -104,6 +104,8 @@ def test_the_largest_shear_of_plane_bodies_may_lie_out_of_their_plane() -> None:
     assert abs(found.normal[0, 2]) == pytest.approx(np.sqrt(0.5), rel=1e-5)
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_random_cycles_are_searched_as_by_a_far_finer_net() -> None:
     stress = np.random.default_rng(0).standard_normal((5, 6, 3, 3))
     stress = np.concatenate([stress + stress.swapaxes(2, 3), (stress + stress.swapaxes(2, 3))[:1]])
