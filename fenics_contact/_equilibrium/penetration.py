@@ -27,7 +27,7 @@ _LOG = logging.getLogger(__name__)
 
 def wetted(torn: TornSystem, front: Front, wet: np.ndarray) -> TornSystem:
     """Return a system with fluid at wet nodes of a front, shape (n,). Collective."""
-    points, pressure = torn.points, front.pressures(torn.scene, pressures_of(torn.scene.contacts))
+    points, pressure = torn.points, front.pressures(pressures_of(torn.scene.contacts))
     at_points = front.at_points(np.where(wet, pressure, 0.0), points)
     return torn.with_fluid(at_points, front.at_points(wet, points) > 0.0, at_points * points.area)
 
@@ -61,9 +61,9 @@ class FluidFront(OuterLoop):
         an earlier place, pressures and friction let it move forth and back, and there is no such state.
         """
         front, points, latest = front_of(torn), torn.points, passes.latest
-        wet = np.zeros(len(front.slave), dtype=bool)
+        wet, by_name = np.zeros(len(front.inlet), dtype=bool), pressures_of(torn.scene.contacts)
         if latest is not None and latest.contact.wet is not None:
-            wet = front.wet_before(latest.contact.points, latest.contact.wet)
+            wet = front.at_nodes(latest.contact.wet, latest.contact.points) > 0.0
         earlier: list[bytes] = []
         while wet.tobytes() not in earlier:
             earlier.append(wet.tobytes())
@@ -71,8 +71,7 @@ class FluidFront(OuterLoop):
             words = f"fluid pass {passes.count}: {counted(int(wet.sum()), 'point')} wet"
             safe_log(_LOG.info, "%s", words)
             passes.remark(words)
-            pressure = front.pressures(torn.scene, pressures_of(torn.scene.contacts))
-            following = front.reached(points, state.contact.pressure, pressure)
+            following = front.reached(points, state.contact.pressure, by_name)
             if np.array_equal(following, wet):
                 return passes.answer(state)
             wet = following
@@ -100,7 +99,7 @@ class FluidFront(OuterLoop):
         if "wet" not in stored:
             return torn
         front = front_of(torn)
-        return wetted(torn, front, front.wet_before(torn.points, stored["wet"]))
+        return wetted(torn, front, front.at_nodes(stored["wet"], torn.points) > 0.0)
 
     def stored_feedback(self, contact: Contact, stored: Mapping[str, np.ndarray]) -> tuple[EnteredFluid]:
         """Return fluid in contacts of bodies that deform much where a stored state had it. Collective."""

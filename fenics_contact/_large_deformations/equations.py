@@ -61,18 +61,20 @@ def relative_residuals(
     displacement: Vector,
     largest: float,
     stiff: float,
+    reach: float,
 ) -> Residuals:
     """Return the relative residuals of a configuration: forces out of balance as `coarse`. Collective.
 
     ``natural`` is λ − P(λ − ρ r), owned; ``forces`` are those out of balance, internal ones, Bᵀλ and loads,
-    torn; small displacements are compared with the ``largest`` on the way.
+    torn; small displacements are compared with the ``largest`` on the way, and none is worth more than a way
+    as long as the ``reach`` of all bodies: those that nothing holds would be in balance far away.
     """
     comm, contact = torn.numbering.comm, torn.numbering.owned >= torn.n_equality
     lengths = displacement, constraint_residual[~contact], torn.right[~contact]
     squares = (x @ x for x in (*forces, *lengths, natural[contact]))
     *sums, count = global_sum(comm, *squares, len(displacement))
     unbalanced, internal, bound, load, moved, open_, given, wrong = np.sqrt(sums)
-    moved = max(moved, given, largest)
+    moved = min(max(moved, given, largest), reach * np.sqrt(count))
     floor = FORCE_FLOOR * stiff * moved / np.sqrt(count)
     # Before anything acts, what is to act is all there is: a tool in a body at rest is no equilibrium.
     force = max(min(internal, bound) if internal > 0 else bound, load, floor) or max(unbalanced, wrong)
@@ -408,7 +410,7 @@ class Equations:
         forces = self._with_free(torn, unbalanced, at.multiplier), internal, bound, acting
         residuals = relative_residuals(
             torn, natural, feasible.violation(at.multiplier), forces, open_, at.displacement, at.largest,
-            self.stiffness,
+            self.stiffness, self._reach,
         )  # fmt: skip
         return ResidualState(self, load, at, responses, external, growth, unbalanced, open_, residuals, least)
 

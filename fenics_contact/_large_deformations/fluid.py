@@ -21,7 +21,6 @@ from fenics_contact._large_deformations.moving_contact import (
 )
 from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.loads import Pressure
-from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import at_copies, nodal_mean_transposed
@@ -65,14 +64,12 @@ class EnteredFluid(ContactFeedback):
     def on(self, contact: MovedContact, load: Loading) -> MovedContact:
         """Return contact with fluid in it."""
         front, torn = self.front, contact.torn
-        points, wet = torn.points, self.marks[front.slave]
-        by_node = np.where(wet, front.pressures(torn.scene, load.fluids), 0.0)
+        points, wet = torn.points, self.marks[front.nodes.slave]
+        by_node = np.where(wet, front.pressures(load.fluids), 0.0)
         pressure, wet = front.at_points(by_node, points), front.at_points(wet, points) > 0.0
         facing = np.maximum(-np.einsum("nd,nd->n", self._outward(contact), points.normal), 0.0)
         force = pressure * contact.points.areas(torn.scene).pressed * facing
-        force[np.isin(points.pair, [k for k in np.unique(front.pair) if _has_wet_master(self.scene, k)])] = (
-            0.0
-        )
+        force[np.isin(points.pair, [k for k in self._pairs if _has_wet_master(self.scene, k)])] = 0.0
         # On the master alone: slaves have pressures of their own.
         slaves = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
         dim = points.normal.shape[1]
@@ -88,7 +85,7 @@ class EnteredFluid(ContactFeedback):
         """Return the outward normals of slaves at the points where fluid may be, shape (n_points, dim)."""
         points, coordinates = contact.torn.points, contact.points.coordinates
         result = -points.normal
-        for number in np.unique(self.front.pair):
+        for number in self._pairs:
             mine, slave = points.pair == number, self.contact.slaves[number]
             result[mine] = slave.normals(coordinates)[np.searchsorted(slave.nodes, points.slave[mine])]
         return result
@@ -103,8 +100,8 @@ class EnteredFluid(ContactFeedback):
         force, _ = contact.at_points(found.evaluation.at.multiplier)
         torn, front = contact.torn, self.front
         pressed = np.maximum(force, 0.0) / contact.points.areas(torn.scene).true
-        wet = front.reached(torn.points, pressed, front.pressures(torn.scene, load.fluids))
-        if np.array_equal(wet, self.marks[front.slave]):
+        wet = front.reached(torn.points, pressed, load.fluids)
+        if np.array_equal(wet, self.marks[front.nodes.slave]):
             return self
         earlier = *(each for each in self.earlier if each[0] == load.time), (load.time, self._key)
         following = replace(self, marks=self._reached(contact, wet), earlier=earlier)
@@ -117,14 +114,19 @@ class EnteredFluid(ContactFeedback):
 
     @property
     def _key(self) -> bytes:
-        return self.marks[self.front.slave].tobytes()
+        return self.marks[self.front.nodes.slave].tobytes()
+
+    @property
+    def _pairs(self) -> np.ndarray:
+        """Numbers of the pairs that fluids enter."""
+        return np.flatnonzero(self.front.fluids >= 0)
 
     def _reached(self, contact: MovedContact, wet: np.ndarray) -> np.ndarray:
         """Return the marks of nodes: wet ones of the front, shape (n,), and those of masters next to them."""
         points, coordinates, scene = contact.torn.points, contact.points.coordinates, self.scene
         marks, at_points = np.zeros_like(self.marks), self.front.at_points(wet, points) > 0.0
-        marks[self.front.slave] = wet
-        for number in np.unique(self.front.pair):
+        marks[self.front.nodes.slave] = wet
+        for number in self._pairs:
             mine = np.flatnonzero(points.pair == number)
             if not _has_wet_master(scene, number) or not len(mine):
                 continue
@@ -186,29 +188,52 @@ class FluidOnSurfaces:
 
 
 def _pressing(
-    scene: Scene, decomposition: Decomposition, front: Front, marks: np.ndarray
+    scene: Scene,
+    decomposition: Decomposition,
+    front: Front,
+    marks: np.ndarray,
+    surface: str = "wetted by a fluid",
 ) -> dict[str, FluidOnSurfaces]:
-    """Return what fluids exert at wet nodes of all bodies, by their names. Collective."""
-    tearing, loads = decomposition.tearing, dict[str, dict[Surface, Pressure]]()
-    split = np.zeros(tearing.n_nodes, dtype=bool)
-    for number in np.unique(front.pair):
-        pair, known = scene.contacts[number], np.ones(tearing.n_nodes, dtype=bool)
-        known[tearing.global_nodes(pair.slave.body, np.unique(scene.facets(pair.slave)))] = False
-        known[front.slave] = True
-        for side in pair.surfaces if _has_wet_master(scene, number) else (pair.slave,):
-            mesh, first = scene.bodies[side.body].mesh, tearing.first_of(side.body)
-            facets = first + mesh.surfaces[side.name]
-            wet = (marks & known).astype(float)
+    """Return what fluids exert at wet nodes of all bodies, by their names. Collective.
+
+    `surface`: name of all facets of a body that a fluid may reach: each counts once, whatever pairs have it.
+    """
+    found = {}
+    for fluid, name in enumerate(front.names):
+        split, loads, bodies = np.zeros(len(marks), dtype=bool), [], dict(scene.bodies)
+        for body, facets in _wettable(scene, np.flatnonzero(front.fluids == fluid)).items():
+            mesh, first = scene.bodies[body].mesh, decomposition.tearing.first_of(body)
+            wet = marks[first : first + mesh.n_nodes].astype(float)
             # Fluid reaches nodes that are held where it is next to them.
-            held = facets[~known[facets]]
-            np.maximum.at(
-                wet, held, np.broadcast_to(wet[facets].max(axis=1)[:, None], facets.shape)[~known[facets]]
-            )
-            split[np.unique(facets[np.ptp(wet[facets], axis=1) > 0.0])] = True
-            field = NodeValues(mesh.points, wet[first : first + mesh.n_nodes])
-            (fluid,) = pair.fluids
-            loads.setdefault(fluid.name, {})[side] = Pressure(side.body, side.name, field)
-    return {
-        name: FluidOnSurfaces.of(replace(scene, loads=list(each.values())), decomposition, split)
-        for name, each in loads.items()
+            held = ~np.isin(first + facets, front.nodes.slave[front.nodes.pair == fluid])
+            held &= np.isin(facets, _slave_nodes(scene, body, np.flatnonzero(front.fluids == fluid)))
+            beside = np.broadcast_to(wet[facets].max(axis=1)[:, None], facets.shape)
+            np.maximum.at(wet, facets[held], beside[held])
+            split[first + np.unique(facets[np.ptp(wet[facets], axis=1) > 0.0])] = True
+            loads.append(Pressure(body, surface, NodeValues(mesh.points, wet)))
+            named = replace(mesh, surfaces={**mesh.surfaces, surface: facets})
+            bodies[body] = replace(scene.bodies[body], mesh=named)
+        wetted = replace(scene, bodies=bodies, loads=loads)
+        found[name] = FluidOnSurfaces.of(wetted, decomposition, split)
+    return found
+
+
+def _wettable(scene: Scene, pairs: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the facets of each body that the fluid of some pairs may reach, each once."""
+    parts: dict[str, list[np.ndarray]] = {}
+    for number in pairs:
+        pair = scene.contacts[number]
+        for side in pair.surfaces if _has_wet_master(scene, number) else (pair.slave,):
+            parts.setdefault(side.body, []).append(scene.bodies[side.body].mesh.surfaces[side.name])
+    joined = {body: np.concatenate(each) for body, each in parts.items()}
+    once = {
+        body: np.unique(np.sort(each, axis=1), axis=0, return_index=True)[1] for body, each in joined.items()
     }
+    return {body: facets[np.sort(once[body])] for body, facets in joined.items()}
+
+
+def _slave_nodes(scene: Scene, body: str, pairs: np.ndarray) -> np.ndarray:
+    """Return the nodes of the slaves of some pairs on a body."""
+    sides = [scene.contacts[number].slave for number in pairs]
+    own = [scene.bodies[body].mesh.surfaces[side.name].ravel() for side in sides if side.body == body]
+    return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *own]))

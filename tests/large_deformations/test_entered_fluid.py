@@ -34,10 +34,10 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact.design import Movement, Objective, PressureNorm
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, LoadStepError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import J2Plasticity, NeoHooke, PlaneStrain
-from tests.large_deformations.wetted import FLOOR, RUBBER, lip
+from tests.large_deformations.wetted import FLOOR, RUBBER, groove, lip
 
 
 def after(scene: Scene, pressures: Sequence[float], **more: Any) -> tuple[State, ...]:
@@ -151,6 +151,29 @@ def test_fluid_presses_a_tool_that_a_force_drives() -> None:
     # Areas of wet nodes, whose normals turn little.
     assert fluid == pytest.approx(0.5 * contact.area[contact.wet].sum(), rel=2e-2)
     assert fluid > 0.2
+
+
+def pressures_in_groove(wall: float) -> tuple[State, ...]:
+    steps = [LoadStep("close"), *(LoadStep(f"{p}", fluids={"fluid": p}) for p in (0.4, 0.8))]
+    return solve_steps(ContactProblem(groove(wall), MPI.COMM_SELF), steps)
+
+
+def test_fluid_in_a_groove_stops_where_any_pair_is_closed_and_drives_the_ring() -> None:
+    for state, pressure in zip(pressures_in_groove(1.08), (0.0, 0.4, 0.8), strict=True):
+        contact = state.contact
+        floor, lid, wall = (contact.on_pair(k) for k in range(3))
+        assert not contact.wet[wall].any(), "no fluid behind floor and lid"
+        pressed = [float(contact.normal_force[part].sum()) for part in (floor, lid, wall)]
+        assert pressed[0] == pytest.approx(pressed[1], rel=1e-6)
+        # Fluid presses from the left on the height that is left of the groove.
+        held = -sum(each.force[0] for each in state.resultants().contacts)
+        assert held == pytest.approx(1.6 * pressure, rel=1e-2, abs=1e-6)
+        assert state.balance().imbalance < 1e-7
+
+
+def test_a_ring_that_nothing_holds_is_not_in_balance_far_away() -> None:
+    with pytest.raises(LoadStepError, match="can be followed up to"):
+        pressures_in_groove(3.0)
 
 
 def test_histories_with_fluid_go_on_from_a_checkpoint(tmp_path: Path) -> None:

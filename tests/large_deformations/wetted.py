@@ -1,11 +1,21 @@
-"""A rubber lip on a floor that fluid may enter."""
+"""A rubber lip on a floor, and a ring in a groove, that fluid may enter."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from fenics_contact import Body, ContactPair, FluidPressure, RigidPlane, Scene, Support, Surface
-from fenics_contact.gallery import rectangle
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Coulomb,
+    FluidPressure,
+    MovingObstacle,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+)
+from fenics_contact.gallery import disc, rectangle
 from fenics_contact.materials import NeoHooke
 
 RUBBER = NeoHooke(5.0, 0.4)
@@ -21,3 +31,17 @@ def lip(x: float = 4.0, top: float = -0.12, fluid: FluidPressure | None = None, 
     pair = ContactPair(Surface("lip", "y0"), FLOOR, fluid=fluid, **more)
     held = [Support("lip", "y1", (0.0, top))]
     return Scene({"lip": Body(mesh.moved(points), RUBBER)}, held, contacts=[pair])
+
+
+def groove(wall: float) -> Scene:
+    """A ring between a floor and a lid that close in the first step; fluid drives it against a wall."""
+
+    def closing(side: float) -> MovingObstacle:
+        plane = RigidPlane((0.0, side), (0.0, -side))
+        return MovingObstacle(plane, lambda time: (None, (0.0, -0.2 * side * min(time, 1.0))))
+
+    oil = FluidPressure(0.0, lambda x: x[:, 0] < -0.999, critical="pressure")
+    outer, rubbing = Surface("ring", "outer"), Coulomb(0.1)
+    pairs = [ContactPair(outer, closing(side), rubbing, fluid=oil) for side in (-1.0, 1.0)]
+    pairs.append(ContactPair(outer, RigidPlane((wall, 0.0), (-1.0, 0.0)), rubbing))
+    return Scene({"ring": Body(disc(1.0, 6), NeoHooke(6.0, 0.45))}, contacts=pairs)
