@@ -359,4 +359,4 @@ def roller_relief(position: np.ndarray, length: float, half_width: float | None 
         ends = [np.arcsinh((length / 2 + sign * y[..., None]) / x) for sign in (-1.0, 1.0)]
         return np.asarray((ends[0] + ends[1]) @ share)
 
-    return sunk(np.zeros(1))[0] - sunk(relative * length / 2)
+    return np.maximum(sunk(np.zeros(1))[0] - sunk(relative * length / 2), 0.0)

@@ -224,6 +224,11 @@ def test_it_is_an_integral_over_the_half_space(place: float) -> None:
     assert roller_relief(np.array([place * half]), 2 * half, b)[0] == pytest.approx(wanted, rel=1e-6)
 
 
+def test_a_relief_is_a_clearance_that_pairs_take_as_their_gap() -> None:
+    relief = roller_relief(np.linspace(-5.0, 5.0, 11), 10.0, 0.10601941747572816)
+    assert relief.min() == relief[5] == 0.0, "not minus a rounding error"
+
+
 def test_places_beyond_the_ends_are_refused() -> None:
     with pytest.raises(InvalidInputError, match=r"position must be within 1 of the middle, got 1\.5"):
         roller_relief(np.array([0.0, 1.5]), 2.0)
