@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from fenics_contact.mesh.cell_types import CellType
     from fenics_contact.mesh.chart import Chart
     from fenics_contact.mesh.collapsed import joined_cells
-    from fenics_contact.mesh.faces import boundary_faces, merge_duplicate_nodes
+    from fenics_contact.mesh.faces import boundary_faces, merge_duplicate_nodes, orient
     from fenics_contact.mesh.quadratic_nodes import in_vtk_order
     from fenics_contact.mesh.quality import scaled_jacobian
     from fenics_contact.mesh.refinement import Refinement, refined
@@ -30,6 +30,7 @@ __all__ = [
     "in_vtk_order",
     "joined_cells",
     "merge_duplicate_nodes",
+    "orient",
     "quadratic",
     "refined",
     "scaled_jacobian",

@@ -332,7 +332,24 @@ def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
 def orient(
     cells: np.ndarray, facets: np.ndarray, dim: int = 3, hanging: HangingNodes = NO_HANGING
 ) -> np.ndarray:
-    """Return boundary facets, whose corners are in any order, in the cells' order: cyclic and outward."""
+    """Return boundary facets, whose corners are in any order, in the cells' order: cyclic and outward.
+
+    Args:
+        cells: Node numbers, as in `cell_faces`.
+        facets: Nodes of each facet, corners alone or all of them, shape (n, nodes of a facet).
+        dim: Dimension of the space, 2 or 3.
+        hanging: Hanging nodes of the mesh.
+
+    Returns:
+        The facets as a surface of `BodyMesh` has them, with all their nodes, shape (n, nodes of a face).
+
+    Raises:
+        InvalidInputError: If one is no boundary face of the cells.
+
+    Example:
+        >>> orient(np.array([[0, 1, 2, 3]]), np.array([[1, 0], [2, 3]]), dim=2).tolist()
+        [[0, 1], [2, 3]]
+    """
     boundary, _ = boundary_faces(cells, dim, hanging)
     matches = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
     check_on_boundary(matches, "facets", facets, dim)
