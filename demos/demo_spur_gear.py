@@ -87,15 +87,10 @@ def angle_at(radius):
 # from the flanks that touch, where cells are small, and 1 to 2 over the space between them, cut out above the
 # root. Flanks know that they are involutes. Teeth meet early and part late, as they bend.
 
-early = 2.0  # mm
 low = np.hypot(base, first) - 0.3
-radii = np.concatenate(
-    [
-        root - gallery.growing_ticks(root - hub, 0.8, 1.5)[::-1],
-        low - gallery.growing_ticks(low - root, cell, 1.4)[-2::-1],
-        np.linspace(low, tip, round((tip - low) / cell) + 1)[1:],
-    ]
-)
+rim = root - gallery.growing_ticks(root - hub, 0.8, 1.5)[::-1]
+below = low - gallery.growing_ticks(low - root, cell, 1.4)[-2:0:-1]
+radii = np.concatenate([rim, below, np.linspace(low, tip, round((tip - low) / cell) + 1)])
 over = gallery.growing_ticks(1.0, cell / 6, 1.6)
 lattice = gallery.rectangle_lattice([radii, np.concatenate([over, [4 / 3, 5 / 3], 2 + over])])
 r, u = lattice.points.T
@@ -109,7 +104,7 @@ def angles(sense):
     """Return the polar angles of the nodes; that of the flanks that touch grows with the radius."""
     spacing, half = 2 * np.pi / teeth, np.pi / (2 * teeth) + angle_at(np.array(pitch))
     space = 2 * half + (u - 1) * (spacing - 2 * half)
-    tooth = angle_at(np.maximum(r, base)) + (u % 2) * 2 * (half - angle_at(np.maximum(r, base)))
+    tooth = angle_at(r) + (u % 2) * 2 * (half - angle_at(r))
     return np.where((u > 1) & (u < 2), space, tooth + (u >= 2) * spacing) - (sense < 0) * spacing
 
 
@@ -120,16 +115,13 @@ def gear(curvature, centre, turn, sense):
     points = r[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]) + centre
     surfaces, true = {"hub": facets[(r[facets] < hub + 1e-9).all(axis=1)]}, {}
     for place in (0, 1):
-        number = place if sense > 0 else 1 - place
+        k = place if sense > 0 else 1 - place
         flank = (u[facets] == 2 * place).all(axis=1)
-        surfaces[f"flank {number}"] = facets[flank & (r[facets] > 1.005 * base).all(axis=1)]
-        surfaces[f"tip {number}"] = facets[flank & (r[facets] > single - cell / 2).all(axis=1)]
-        around = turned + sense * number * 2 * np.pi / teeth
-        c, s = np.cos(around), np.sin(around)
-        placed = np.array([[c, s], [-s, c]])
-        true[f"flank {number}"] = shapes.Parametric(
-            lambda roll, placed=placed: involute(roll) @ placed + centre, (0.05,), (0.6,)
-        )
+        surfaces[f"flank {k}"] = facets[flank & (r[facets] > 1.005 * base).all(axis=1)]
+        surfaces[f"tip {k}"] = facets[flank & (r[facets] > single - cell / 2).all(axis=1)]
+        around = turned + sense * k * 2 * np.pi / teeth
+        placed = np.array([[np.cos(around), np.sin(around)], [-np.sin(around), np.cos(around)]])
+        true[f"flank {k}"] = shapes.Parametric(lambda t, m=placed: involute(t) @ m + centre, (0.05,), (0.6,))
     return BodyMesh(points, cells, surfaces, shapes=true)
 
 
@@ -149,7 +141,7 @@ def scene_of(place):
     pairs = [
         ContactPair(Surface("wheel", f"flank {k}"), Surface("pinion", f"flank {k}"), discretisation="mortar")
         for k in (0, 1)
-        if place + k * step < last + early
+        if place + k * step < last + 2.0
     ]
     bodies = {"pinion": Body(pinion, steel), "wheel": Body(wheel, steel)}
     return Scene(bodies, [Support("wheel", "hub"), driven], contacts=pairs)
@@ -198,8 +190,7 @@ def uneven(gains):
 even = np.full(POINTS - 1, 1 / (POINTS - 1))
 
 
-def of_depth(depth):
-    """Return the same for a linear relief of a depth at the tip."""
+def of_depth(depth):  # the same of a linear relief
     value, slope = uneven(depth[0] * even)
     return value, np.array([slope @ even])
 
@@ -221,51 +212,40 @@ gradient_error = abs(uneven(middle)[1] @ way / quotient - 1)
 
 # ## Pictures: Harris maps, and the shape of the relief
 
-table, states = {}, {}
+
+def draw(name, xlabel, ylabel, series):
+    labels = {"xlabel": xlabel, "ylabel": ylabel}
+    pictures.plot_curves(series, output / f"{name}.png", **labels, connected=True, comm=comm)
+
+
+table, shown, along = {}, {}, np.linspace(0.0, 1.0, 41)
 for name, gains in reliefs.items():
     points, errors = evaluated(gains)
-    states[name] = points[count // 2][-1].state
     largest = [max(float(row[k].state.contact.pressure.max()) for row in points) for k in range(len(torques))]
     table[name] = {"rms": uneven(gains)[0], "range": np.ptp(errors, axis=0), "pressure": largest}
-    pictures.plot_curves(
-        {f"{torque:.0%} of the torque": (places - first, errors[:, k]) for k, torque in enumerate(torques)},
-        output / f"{name.replace(' ', '_')}.png",
-        xlabel="way of the contact along the line of action (mm)",
-        ylabel="transmission error (µm)",
-        connected=True,
-        title=f"Transmission error: {name}",
-        comm=comm,
-    )
-along = np.linspace(0.0, 1.0, 41)
-pictures.plot_curves(
-    {
-        name: ((tip - single) * along, 1e3 * BPoly(np.append(0.0, np.cumsum(gains))[:, None], [0, 1])(along))
-        for name, gains in reliefs.items()
-    },
-    output / "relief.png",
-    xlabel="radius over the highest point of single contact (mm)",
-    ylabel="relief (µm)",
-    connected=True,
-    comm=comm,
-)
-pictures.plot_stress(states["ours"], output / "stress.png", scale=1.0, title="Relieved tips, full torque")
+    curves = {f"{torque:.0%} of the torque": (places - first, e) for torque, e in zip(torques, errors.T)}
+    draw(name.replace(" ", "_"), "way along the line of action (mm)", "transmission error (µm)", curves)
+    depth = BPoly(np.append(0.0, np.cumsum(gains))[:, None], [0, 1])(along)
+    shown[name] = ((tip - single) * along, 1e3 * depth)
+draw("relief", "radius over the highest point of single contact (mm)", "relief (µm)", shown)
+state = points[count // 2][-1].state
+pictures.plot_stress(state, output / "stress.png", scale=1.0, title="Relieved tips, full torque")
 
 # ## Result
 
 evaluations = {"best linear": linear.evaluations, "ours": ours.evaluations}
 record = {"table": table, "evaluations": evaluations, "gradient": gradient_error, "relief": np.cumsum(ours.x)}
-write_result(states["ours"], output, more=record)
+write_result(state, output, more=record)
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
     nodes = sum(body.mesh.n_nodes for body in scene.bodies.values())
     print(f"spur gear: {nodes} nodes, {count} positions, {len(torques)} torques, {ranks}")
-    print("transmission error: rms, and range over a mesh cycle by torque (µm); largest pressure (N/mm²)")
+    shown = "" if small else "; largest pressure (N/mm²)"  # cells of the small size are too wide for it
+    print(f"transmission error: rms, and range over a mesh cycle by torque (µm){shown}")
     for name, row in table.items():
         ranges = "".join(f"{value:7.2f}" for value in row["range"])
-        print(
-            f"  {name:12s}{row['rms']:7.3f}{ranges}   "
-            + "".join(f"{value:7.0f}" for value in row["pressure"])
-        )
+        largest = "".join(f"{value:7.0f}" for value in row["pressure"] if shown)
+        print(f"  {name:12s}{row['rms']:7.3f}{ranges}   {largest}".rstrip())
     for (name, number), spent in zip(evaluations.items(), np.diff(began), strict=True):
         print(f"  {name}: {number} designs, {spent:.0f} s")
     print(f"  relief of ours {', '.join(f'{1e3 * value:.1f}' for value in np.cumsum(ours.x))} µm")

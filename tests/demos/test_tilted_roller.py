@@ -16,7 +16,7 @@ def test_a_profile_found_for_all_tilts_outlives_those_by_formula(
     result, output, printed = demo("tilted_roller", "--size", "small", ranks=ranks, timeout=500.0)
     assert printed.count("pictures and files in") == 1, "one rank prints"
     pictures = {path.stem: path for path in output.glob("*.png")}
-    assert set(pictures) == {"pressure", "profile", "life"}
+    assert set(pictures) == {"profile", "life"}
     assert min(path.stat().st_size for path in pictures.values()) > 10_000
     more = result["more"]
     life, largest, lives = more["life"], more["largest"], more["lives"]
