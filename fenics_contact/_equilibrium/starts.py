@@ -160,7 +160,12 @@ class CoarseStart:
         ties = np.flatnonzero(glued & (torn.numbering.owned >= torn.n_gluing))
         entries = np.ones(len(ties)), (ties, np.arange(len(ties)))
         lifting = system.preconditioner.lifting(sp.csr_matrix(entries, shape=(len(start), len(ties))))
-        return np.where(glued, balanced + lifting.multiplier(force), start)
+        guess = np.where(glued, balanced + lifting.multiplier(force), start)
+        left = np.zeros(len(moved))
+        left[system.inverse.interface] = force
+        left -= torn.force(np.where(glued, guess - balanced, 0.0))
+        missing = problem.coarse.load - problem.coarse.apply(guess)
+        return system.soft_motions.balanced(guess, np.flatnonzero(glued), missing, left)
 
     def displacement(self, torn: TornSystem) -> np.ndarray:
         """Return the interpolated displacement on this rank's torn dofs. Collective."""

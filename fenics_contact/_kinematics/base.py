@@ -221,6 +221,10 @@ class Kinematics:
         """Return which points lie on an axis of revolution, (n,)."""
         return np.zeros(len(points), dtype=bool)
 
+    def nearly_rigid(self, points: np.ndarray) -> np.ndarray:
+        """Return motions that a small part of a body hardly resists, (n, components, n_modes): none."""
+        return np.zeros((len(points), self.components, 0))
+
     def rigid_modes(self, points: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
         """Return the rigid motions of a body at its nodes or elsewhere, see `rigid_body_modes`."""
         return rigid_body_modes(points, at)

@@ -234,6 +234,18 @@ class Revolution(Kinematics):
         """Return the translation along the axis, shape (n, 2, 1)."""
         return self._modes(points if at is None else at, float(points[:, 0].max()))
 
+    def nearly_rigid(self, points: np.ndarray) -> np.ndarray:
+        """Return the radial motion and the turn of the section.
+
+        Of a part of size d at the radius r, hoop strains alone resist them: with (d / r)² of its stiffness.
+        """
+        arms = points - points.mean(axis=0)
+        modes = np.zeros((len(points), self.components, 2))
+        modes[:, 0, 0] = 1.0
+        modes[:, 0, 1], modes[:, 1, 1] = -arms[:, 1], arms[:, 0]
+        modes[self.on_axis(points), 0] = 0.0
+        return modes
+
     def _modes(self, points: np.ndarray, radius: float) -> np.ndarray:
         modes = np.zeros((len(points), self.components, self.motions))
         modes[:, 1, 0] = 1.0

@@ -72,6 +72,13 @@ def by_resistance(stiffness: sp.csr_matrix, modes: np.ndarray) -> tuple[np.ndarr
     if not stiffness.nnz:
         return modes, modes[:, :0], np.zeros(0)
     resisted, free = separated(stiffness, modes)
-    basis = np.linalg.qr(modes @ resisted)[0]
+    return modes @ free, *by_stiffness(stiffness, modes @ resisted, modes[:, :0])
+
+
+def by_stiffness(
+    stiffness: sp.csr_matrix, modes: np.ndarray, kernel: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return orthonormal motions R that span modes, (n, k), without those of a kernel, and RᵀK R of each."""
+    basis = np.linalg.qr(np.hstack([kernel, modes]))[0][:, kernel.shape[1] :]
     values, vectors = np.linalg.eigh(basis.T @ (stiffness @ basis))
-    return modes @ free, basis @ vectors, values
+    return basis @ vectors, values

@@ -1,4 +1,6 @@
-"""A coarse space of motions that are resisted, but little: of subdomains on foundations or on springs.
+"""A coarse space of motions that are resisted, but little: of subdomains on foundations, springs, in rings.
+
+Rings resist the radial motion of a small part and its turn in the section by hoop strains alone.
 
 The matrix K of such a subdomain is regular, and the equilibrium G λ = e lacks its rigid motions R, whose
 stiffness S = RᵀK R may be small: without a coarse space for them FETI is not scalable. With K⁺ of the
@@ -68,6 +70,12 @@ class NoSoftMotions(NoSecondLevel):
     def resultants(self, lacking: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Return ``lacking`` as it is, see `SoftMotions`."""
         return lacking
+
+    def balanced(
+        self, multiplier: np.ndarray, rows: np.ndarray, missing: np.ndarray, left: np.ndarray
+    ) -> np.ndarray:
+        """Return a multiplier as it is, see `SoftMotions`."""
+        return multiplier
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +173,20 @@ class SoftMotions:
         soft = self.columns[len(lacking) :] @ (change / self.factor)
         return np.concatenate([lacking, global_sum(self.comm, soft)])
 
+    def balanced(
+        self, multiplier: np.ndarray, rows: np.ndarray, missing: np.ndarray, left: np.ndarray
+    ) -> np.ndarray:
+        """Return a multiplier changed on some rows by what it leaves unbalanced on all motions. Collective.
+
+        A small part of it would move subdomains far. `rows`: their numbers, owned; `missing`: e − G λ;
+        `left`: forces without balance on this rank's torn dofs.
+        """
+        entries = np.ones(len(rows)), (rows, np.arange(len(rows)))
+        free = sp.csr_matrix(entries, shape=(len(multiplier), len(rows)))
+        coarse = self.coarse(free)
+        wanted = np.concatenate([missing, global_sum(self.comm, self.modes.resultants(left))])
+        return np.asarray(multiplier + self.factor * (free @ coarse.transpose(coarse.solve(wanted))))
+
 
 @dataclass(frozen=True, eq=False)
 class SoftMotionsOfFace:
@@ -194,11 +216,13 @@ class SoftMotionsOfFace:
         """Return that of two bases, with the damping of the face. Collective."""
         return self.build(self.motions, self.weight, tested, moving)
 
-    def balancing(self, coarse: CoarseSpace, resultant: np.ndarray) -> np.ndarray:
-        """Return y of a face with G Z y = resultant that costs little energy. Collective."""
-        wanted = np.zeros(len(self.motions.stiffness))
-        wanted[: len(resultant)] = resultant
-        return self.weight * (self.tested.T @ self.inverse.solve(wanted))
+    def balancing(self, coarse: CoarseSpace, resultant: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Return y of a face with G Z y = resultant that costs little energy. Collective.
+
+        Forces of contacts that open would move soft subdomains far: y has the resultants of the change of λ.
+        """
+        soft = global_sum(self.motions.comm, self.motions.columns[len(resultant) :] @ change)
+        return self.weight * (self.tested.T @ self.inverse.solve(np.concatenate([resultant, soft])))
 
     def __call__(self, inner: Operator, residual: np.ndarray) -> np.ndarray:
         """Return z. Collective."""

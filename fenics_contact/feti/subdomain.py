@@ -32,7 +32,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.by_shape import BY_MATRIX, ByMatrix, ByShape, Families
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.following import AnyFollowing, Following
-from fenics_contact.feti.foundations import by_resistance, foundation_stiffness
+from fenics_contact.feti.foundations import by_resistance, by_stiffness, foundation_stiffness
 from fenics_contact.feti.nearby import ToleranceIndex
 from fenics_contact.materials.elastic import Material, is_isotropic
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -239,8 +239,8 @@ class Subdomain:
 
     Those that differ only in their loads share one `matrix`. `load`: f_s; `kernel`: R_s: zero-energy modes as
     columns; `typical_stiffness`: mean diagonal entry of K_s without foundations; `resisted`: motions that
-    foundations or springs of a tool alone resist, as columns, shape (dim n, r); `resistance`: RᵀK R of each
-    of these, shape (r,); `shape`: what the stiffness is compared by.
+    foundations, springs of a tool or hoop strains alone resist, as columns, shape (dim n, r); `resistance`:
+    RᵀK R of each of these, shape (r,); `shape`: what the stiffness is compared by.
     """
 
     mesh: SubdomainMesh
@@ -515,6 +515,9 @@ def _with_stiffness(
     matrix = CachedMatrix(stiffness)
     modes = np.concatenate([kernel, body.sprung_modes(points).reshape(mesh.size, -1)], axis=1)
     kernel, resisted, resistance = by_resistance(body.sprung(bed, points), modes)
+    nearly = body.kinematics.nearly_rigid(points).reshape(mesh.size, -1)
+    if nearly.shape[1] and not body.is_rigid:
+        resisted, resistance = by_stiffness(matrix.get(), np.hstack([resisted, nearly]), kernel)
 
     def typical() -> float:
         K = matrix.get()

@@ -82,8 +82,8 @@ class FaceSystem:
         """Return the owned vector on the face and in equilibrium that is closest to λ. Collective."""
         on_face = self.face.nearest(multiplier)
         y = self.face.restrict(on_face)
-        missing = self.coarse.residual(y)
-        return on_face - self.face.prolong(self.second_level.balancing(self.coarse, missing))
+        given = self.second_level.balancing(self.coarse, self.coarse.residual(y), on_face - multiplier)
+        return on_face - self.face.prolong(given)
 
     def advance(self, step: Vector) -> Vector:
         """Return the change of the multiplier, Z δ, owned, for a step δ in face coordinates."""

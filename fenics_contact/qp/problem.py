@@ -130,8 +130,11 @@ class SecondLevelOfFace(Protocol):
     def along(self, tested: sp.csr_matrix, moving: sp.csr_matrix) -> SecondLevelOfFace:
         """Return that of a step which moves along another basis than it is tested with. Collective."""
 
-    def balancing(self, coarse: CoarseSpace, resultant: Vector) -> Vector:
-        """Return y of the face with G Z y = resultant that costs little energy. Collective."""
+    def balancing(self, coarse: CoarseSpace, resultant: Vector, change: Vector) -> Vector:
+        """Return y of the face with G Z y = resultant that costs little energy. Collective.
+
+        It has the resultants of a change of λ, owned, on the motions of the second level.
+        """
 
     def __call__(self, inner: Operator, residual: Vector) -> Vector:
         """Return the preconditioned residual of the face with an inner preconditioner of it. Collective."""
@@ -148,7 +151,7 @@ class NoSecondLevel:
         """Return itself."""
         return self
 
-    def balancing(self, coarse: CoarseSpace, resultant: Vector) -> Vector:
+    def balancing(self, coarse: CoarseSpace, resultant: Vector, change: Vector) -> Vector:
         """Return the shortest one. Collective."""
         return coarse.transpose(coarse.solve(resultant))
 

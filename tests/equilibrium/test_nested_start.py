@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from fenics_contact._adaptive.refined_scene import refine_scene
 from fenics_contact._equilibrium.starts import solve_from_coarse
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual
@@ -90,6 +91,22 @@ def test_products_do_not_grow_with_the_level(levels: list[LinearState], cold: Li
     assert np.median(products[-3:]) <= np.median(products[:3]) + 5  # single ones take 7 to 30
     assert products[-1] <= 0.6 * cold.solution.products
     assert cold.energies.strain == pytest.approx(levels[-1].energies.strain, rel=1e-4)
+
+
+def test_small_parts_of_rings_start_as_well() -> None:
+    """Forces that balance on all their motions: else 28 to 176 products on these meshes."""
+    flat, steel = disc_on_block(friction=None), IsotropicElasticity(2.1e5, 0.3)
+    away = np.array([100.0, 0.0])
+    rings = {
+        name: Body(body.mesh.placed(np.eye(2), away), steel, axisymmetric=True)
+        for name, body in flat.bodies.items()
+    }
+    states = [ContactProblem(replace(flat, bodies=rings), SELF).solve()]
+    for level in range(5):
+        fine = refined_near(states[-1].scene, (100.0, 0.0), 4.0 * 0.8**level)
+        problem = ContactProblem(fine.scene, SELF, partitions=cut(fine.scene, 2 + level))
+        states.append(problem.solve(start=states[-1], refinements=fine.refinements))
+    assert max(linear(state).solution.products for state in states) <= 35
 
 
 def test_few_faces_are_needed(levels: list[LinearState], cold: LinearState) -> None:

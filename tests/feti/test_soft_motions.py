@@ -1,4 +1,4 @@
-"""Subdomains on elastic foundations are as easily glued as others, however soft the foundations are."""
+"""Subdomains on elastic foundations, and small ones of rings, are as easily glued as others."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact.feti.soft_motions import SoftMotions, SoftMotionsOfFace
-from fenics_contact.gallery import block
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.results.linear_state import LinearState, as_linear
 
@@ -52,6 +52,41 @@ def test_soft_foundations_cost_at_most_little_more_than_clamps(n: int, share: fl
     """Without their coarse space 51 products at 27 subdomains, and 78 at 64, against 13 and 14."""
     clamped = cube(n, np.inf).solution.products
     assert cube(n, share * YOUNG).solution.products <= 1.3 * clamped
+
+
+def ring(n: int, radius: float) -> LinearState:
+    """A ring of a square section of n² subdomains, H/h = 4, clamped at its foot."""
+    mesh = rectangle((radius, 0), (radius + 1, 1), (4 * n, 4 * n))
+    scene = Scene(
+        {"ring": Body(mesh, STEEL, axisymmetric=True)},
+        [Support("ring", "y0")],
+        [Traction("ring", "y1", (20.0, -50.0))],
+    )
+    parts = {"ring": box_partition(mesh, (n, n))}
+    return as_linear(solve_scene(scene, MPI.COMM_SELF, partitions=parts, tolerance=1e-6), "products")
+
+
+@pytest.mark.parametrize("radius", [1.0, 100.0])
+def test_rings_of_many_small_subdomains_are_easily_glued(radius: float) -> None:
+    """Hoop strains alone hold a small part: without its motions 39 to 256 products, and more with each."""
+    few, many = (ring(n, radius).solution.products for n in (4, 8))
+    assert few <= 25
+    assert many <= few + 3
+
+
+def test_hoop_strains_resist_the_motions_of_a_small_part_alone() -> None:
+    body = Body(rectangle((0, 0), (1, 1), (3, 3)), STEEL, axisymmetric=True)
+    softest = []
+    for radius in (10.0, 1e3):
+        (part,) = ring(1, radius).torn.subdomains
+        assert part.resisted.shape[1] == 2
+        np.testing.assert_allclose(part.resisted.T @ part.kernel, 0.0, atol=1e-10)
+        energy = part.resisted.T @ (part.stiffness @ part.resisted)
+        np.testing.assert_allclose(energy, np.diag(part.resistance), atol=1e-9 * part.resistance.max())
+        softest.append(part.resistance.min() / part.typical_stiffness)
+    assert softest[0] < 1e-2
+    assert softest[1] == pytest.approx(1e-4 * softest[0], rel=0.3)
+    assert (body.kinematics.nearly_rigid(body.mesh.points)[body.mesh.points[:, 0] == 0.0, 0] == 0.0).all()
 
 
 def test_firm_foundations_are_left_as_they_are() -> None:
