@@ -129,6 +129,9 @@ study-optimisers: $(prepare) ## Compare SciPy's optimisers with the bundle metho
 study-surfaces: $(prepare) ## Compare facets, reconstructed and true surfaces with theory; docs/studies/
 	$(python) -m benchmarks true_surfaces $(if $(filter quick,$(BENCH)),--quick)
 
+study-others: $(prepare) ## Solve published problems, with error bars; docs/studies/
+	$(python) -m benchmarks others $(if $(filter quick,$(BENCH)),--quick)
+
 study-adaptive: $(prepare) ## Refine meshes where it pays, and everywhere; docs/studies/
 	$(python) -m benchmarks adaptive $(if $(filter quick,$(BENCH)),--quick)
 

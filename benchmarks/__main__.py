@@ -26,6 +26,7 @@ STUDIES = {
     "large_deformations": "benchmarks.large_deformations.report",
     "optimisation_tolerance": "benchmarks.optimisation_tolerance.report",
     "optimisers": "benchmarks.optimisers.report",
+    "others": "benchmarks.others.report",
     "peers": "benchmarks.peers.report",
     "refinement": "benchmarks.refinement",
     "true_surfaces": "benchmarks.true_surfaces.report",
