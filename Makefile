@@ -30,7 +30,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test coverage test-core test-slow test-hard test-claims mutants random-scenes spoilt-files docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-adaptive study-large study-peers lint setup setup-demo
+.PHONY: help demo demos notebooks test coverage test-core test-slow test-hard test-claims mutants random-scenes spoilt-files docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-others study-adaptive study-large study-peers lint setup setup-demo
 
 help: ## Show this list
 	@echo "Targets:"

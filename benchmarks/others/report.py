@@ -8,9 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 from mpi4py import MPI
 
-from benchmarks.others import linear, warm
+from benchmarks.others import large, linear, warm
 from benchmarks.others.rows import Problem, Row
 from benchmarks.study import ROOT, Records, Study, filled, found, unfilled
 from fenics_contact.output import write_json, write_text
@@ -23,6 +24,7 @@ PROBLEMS = {
     "pin": Problem("Pin in a bore, SSNV127", linear.pin_rows),
     "flat punch": Problem("Flat punch on a slab, solids4foam", linear.flat_punch_rows),
     "tube": Problem("Tube that closes a gap, SSNA105", linear.tube_rows),
+    "rubber": Problem("Rubber cylinder between plates, Sussman and Bathe", large.rubber_rows),
     "joint": Problem("Heat through a pressed joint, MOOSE", warm.joint_rows),
     "annulus": Problem("Heat across an annular gap, MOOSE", warm.annulus_rows),
     "gap": Problem("Gap conductance, Abaqus", warm.obstacle_rows),
@@ -65,13 +67,51 @@ def tables(study: Mapping[str, list[dict[str, Any]]]) -> dict[str, str]:
             ours = f"{row.value:.6g} ± {row.error:.1g}"
             lines.append(
                 (
-                    PROBLEMS[name].title, row.quantity, ours, reference if known else "", row.source, within,
-                    row.others, f"{row.unknowns}", f"{row.products}", f"{row.seconds:.1f}",
+                    PROBLEMS[name].title, row.quantity, ours, reference if known else "",
+                    row.source if known else "", within, row.others, f"{row.unknowns}",
+                    f"{row.products}", f"{row.seconds:.1f}",
                 )
             )  # fmt: skip
             if name == "punch":
                 levels.append((row.quantity, ", ".join(str(products) for _, products in row.levels)))
     return {"problems": table(head, lines), "products": table(("quantity", "products by mesh"), levels)}
+
+
+def plot(path: Path, study: Mapping[str, list[dict[str, Any]]]) -> None:
+    """Draw the pressure at the punch's edge by mesh, and the force on the rubber cylinder by its closing."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.4), layout="constrained")
+    for row, marker in zip(
+        (row_of(each) for each in study["punch"] if "pressure" in each["quantity"]), "os", strict=True
+    ):
+        values = [value for value, _ in row.levels]
+        left.plot(
+            range(1, len(values) + 1),
+            values,
+            marker=marker,
+            markersize=4,
+            label=row.quantity.split(", ")[-1].split(" [")[0],
+        )
+    left.axhspan(230.0, 430.0, color="0.85", label="other codes")
+    left.set(title="Punch with a rounded edge", xlabel="mesh of solve_to", ylabel="largest pressure (N/mm²)")
+    ways, rows = zip(*((float(r["quantity"].split()[2]), row_of(r)) for r in study["rubber"]), strict=True)
+    right.plot((0.0, *ways), (0.0, *(row.value for row in rows)), label="here")
+    right.plot(
+        ways, [row.reference for row in rows], "ks", markersize=5, fillstyle="none", label="Sussman and Bathe"
+    )
+    right.plot([200.0], [1.27], "r^", markersize=5, label="solids4foam")
+    right.set(
+        title="Rubber cylinder",
+        xlabel="closing (mm)",
+        ylabel="force (kN/mm)",
+        xlim=(0.0, 210.0),
+        ylim=(0.0, 1.55),
+    )
+    for axis in (left, right):
+        axis.legend(frameon=False, fontsize="small")
+        axis.grid(True, alpha=0.3)
+        axis.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
 
 
 def check(records: Records) -> list[str]:
@@ -92,6 +132,8 @@ def write(folder: Path, records: Records, quick: bool) -> None:
     study_ = {name: known[name] for name in PROBLEMS if name in known}
     if records:
         write_json(folder / f"{NAME}.json", study_)
+    if not quick:
+        plot(folder / f"{NAME}.png", study_)
     page = HOME / f"{NAME}.md"
     texts = tables(study_)
     write_text(

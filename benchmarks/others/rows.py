@@ -26,9 +26,9 @@ class Row:
         margin: How far the reference itself may be off, relative to it.
         others: What other codes print, in words.
         unknowns: Of the last mesh.
-        products: Products with F of the mesh that took most.
+        products: Products with F of the mesh that took most; else Newton's steps on the last.
         seconds: Processor time of all meshes.
-        levels: Value and products on each mesh.
+        levels: Value of the state, without correction, and products on each mesh.
     """
 
     quantity: str
@@ -86,6 +86,6 @@ def accurately(
         unknowns=found.levels[-1].unknowns,
         products=max(level.products for level in found.levels),
         seconds=process_time() - began,
-        levels=tuple((scale * level.value, level.products) for level in found.levels),
+        levels=tuple((scale * level.state_value, level.products) for level in found.levels),
         **row,
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.others import linear, warm
+from benchmarks.others import large, linear, warm
 from benchmarks.others.report import PROBLEMS, QUICK, check, row_of, tables
 from benchmarks.others.rows import Row
 from benchmarks.study import filled
@@ -73,7 +73,7 @@ def test_a_reference_outside_of_the_bar_is_found() -> None:
     "scene",
     [
         lambda: linear.roller(0.1), lambda: linear.punch(0.1), linear.pin, linear.flat_punch,
-        lambda: linear.tube(1e-3),
+        lambda: linear.tube(1e-3), lambda: large.rubber_cylinder(4),
     ],
 )  # fmt: skip
 def test_each_scene_has_a_plan(scene: Callable[[], Scene]) -> None:
@@ -84,7 +84,7 @@ def test_each_scene_has_a_plan(scene: Callable[[], Scene]) -> None:
 
 
 @pytest.mark.claim
-@pytest.mark.parametrize("name", ["pin", "roller", "flat punch"])
+@pytest.mark.parametrize("name", ["pin", "roller", "flat punch", "rubber"])
 def test_a_problem_is_what_the_record_says(record: dict[str, Any], name: str) -> None:
     for row, stored in zip(PROBLEMS[name].rows(), map(row_of, record[name]), strict=True):
         assert row.value == pytest.approx(stored.value, abs=row.error + stored.error)
