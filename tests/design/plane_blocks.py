@@ -88,7 +88,9 @@ def plane_problem(
     surfaces = [s for pair in scene.contacts for s in (pair.slave, pair.master) if isinstance(s, Surface)]
     net = 5 if scene.dim == 2 else (3, 2)
     designs = tuple(SurfaceDesign(s.body, s.name, net) for s in (*surfaces, *also))
-    contact = ContactProblem(scene, comm, partitions=partitions(scene, (cuts, 1, 1)), solver=SOLVER)
+    contact = ContactProblem(
+        scene, comm, partitions=partitions(scene, (cuts, 1, 1)), solver=SOLVER.with_tolerance(1e-12)
+    )
     return Remembering(contact, designs, TotalPotential())
 
 
