@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,8 +21,36 @@ from fenics_contact._surfaces.facets import FacetedSurface, corner_places, heigh
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean
 from fenics_contact.feti.subdomain import Subdomain, assemble
+from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class LinearChange:
+    """The change of ∫ C ∇u : ∇v, see `between_facets`, from the energies of u + v and u − v."""
+
+    before: Mapping[str, CellEnergies]
+
+    @classmethod
+    def of(cls, torn: TornSystem) -> LinearChange:
+        """Return that of a scene. Collective."""
+        return cls({name: CellEnergies(torn, body) for name, body in torn.scene.bodies.items()})
+
+    def __call__(
+        self, subdomain: Subdomain, after: Body, u: np.ndarray, v: np.ndarray, among: np.ndarray
+    ) -> np.ndarray:
+        """Return it over each cell."""
+        size = [np.ptp(field, axis=1).max(initial=0.0) for field in (u, v)]
+        scale = size[0] / size[1] if min(size) > 0.0 else 1.0
+        nothing = np.zeros((*u.shape, after.mesh.dim))
+        before = self.before[subdomain.mesh.body]
+        moved = replace(subdomain, points=after.mesh.points[subdomain.mesh.nodes])
+        change = np.zeros(len(u))
+        for energies, part, sign in ((before, subdomain, -1.0), (before.moved(after), moved, 1.0)):
+            for way in (1.0, -1.0):
+                change += sign * way * energies.by_cell(part, u + way * scale * v, nothing, among)
+        return change / (4.0 * scale)
 
 
 @dataclass(frozen=True)
@@ -32,8 +61,13 @@ class EnergyShares:
     load: float = 0.0
 
 
+#: Change of ∫ P : ∇v over each cell of a subdomain when its nodes move: takes the subdomain, the body after
+#: that, u and v at the nodes of cells, and which cells of the body count.
+Change: TypeAlias = "Callable[[Subdomain, Body, np.ndarray, np.ndarray, np.ndarray], np.ndarray]"
+
+
 def between_facets(
-    state: LinearState, along: np.ndarray, own: EnergyShares, step: float = 1e-3
+    state: State, along: np.ndarray, own: EnergyShares, change: Change, step: float = 1e-3
 ) -> tuple[float, OfCells]:
     """Return δL(w) − δa(u, w) + δJ by true shapes instead of facets, and the share of each cell. Collective.
 
@@ -41,7 +75,8 @@ def between_facets(
     around them, which makes the volume the true one to first order. δ is the derivative along that motion, of
     the work a of stresses, the work L of loads and what the objective itself depends on the shape, as far as
     that is known. Gaps between true surfaces do not change. Nothing is done for quadratic cells, whose facets
-    are curved themselves. `along`: the adjoint w, torn; `step`: part of the motion by which differences are
+    are curved themselves. Pressures that follow their surfaces count as on undeformed ones. `along`: the
+    adjoint w, torn; `change`: of the work of stresses; `step`: part of the motion by which differences are
     taken.
     """
     torn, parts, total = state.torn, Parts(state.scene.bodies), 0.0
@@ -59,10 +94,10 @@ def between_facets(
     )
     with together(comm):
         loads = as_tractions(moved)
-        changes = {name: _Change(state, moved, name, loads) for name in changed}
+        changes = {name: _Change(state, moved, name, loads, change) for name in changed}
         for subdomain in torn.subdomains:
-            if (change := changes.get(subdomain.mesh.body)) is not None:
-                by_cell = change.by_cell(subdomain, fields, own) / step
+            if (found := changes.get(subdomain.mesh.body)) is not None:
+                by_cell = found.by_cell(subdomain, fields, own) / step
                 parts.add(subdomain, np.abs(by_cell))
                 total += float(by_cell.sum())
     return float(comm.allreduce(total)), parts.joined()
@@ -127,7 +162,9 @@ def _edges(surface: FacetedSurface) -> tuple[np.ndarray, np.ndarray]:
 class _Change:
     """What works on cells of one body change by when its nodes move."""
 
-    def __init__(self, state: LinearState, moved: Scene, name: str, loads: tuple[Load, ...]) -> None:
+    def __init__(
+        self, state: State, moved: Scene, name: str, loads: tuple[Load, ...], change: Change
+    ) -> None:
         torn = state.torn
         self._bodies = torn.scene.bodies[name], moved.bodies[name]
         before, after = (body.mesh for body in self._bodies)
@@ -140,8 +177,7 @@ class _Change:
         self._nodes = torn.decomposition.tearing.global_nodes(name, np.arange(before.n_nodes))
         self._marked = (before.points != after.points).any(axis=1)[before.cells].any(axis=1)
         self._forms = torn.decomposition.forms
-        energies = CellEnergies(torn, self._bodies[0])
-        self._energies = energies, energies.moved(self._bodies[1])
+        self._work = change
 
     def by_cell(
         self, subdomain: Subdomain, fields: tuple[np.ndarray, np.ndarray], own: EnergyShares
@@ -150,27 +186,13 @@ class _Change:
         mesh = subdomain.mesh
         cells = self._bodies[1].mesh.cells[mesh.cells]
         u, w = (field[self._nodes] for field in fields)
-        turned = self._work(subdomain, cells, u, 0.5 * own.strain * u - w)
+        both = u[cells], (0.5 * own.strain * u - w)[cells]
+        turned = self._work(subdomain, self._bodies[1], *both, self._marked)
         load = self._load(subdomain) * (w - own.load * u)[mesh.nodes].ravel()
         by_node = np.zeros(len(self._nodes))
         by_node[mesh.nodes] = load.reshape(len(mesh.nodes), -1).sum(axis=1)
         around = np.bincount(cells.ravel(), minlength=len(by_node))
         return np.asarray(turned + (by_node / np.maximum(around, 1))[cells].sum(axis=1))
-
-    def _work(self, subdomain: Subdomain, cells: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return the change of ∫ C ∇u : ∇v over each cell, from the energies of u + v and u − v."""
-        size = [np.ptp(field[cells], axis=1).max(initial=0.0) for field in (u, v)]
-        scale = size[0] / size[1] if min(size) > 0.0 else 1.0
-        nothing = np.zeros((*cells.shape, u.shape[1], self._bodies[1].mesh.dim))
-        points = self._bodies[1].mesh.points[subdomain.mesh.nodes]
-        change = np.zeros(len(cells))
-        for energies, part, sign in zip(
-            self._energies, (subdomain, replace(subdomain, points=points)), (-1.0, 1.0), strict=True
-        ):
-            for way in (1.0, -1.0):
-                both = (u + way * scale * v)[cells]
-                change += sign * way * energies.by_cell(part, both, nothing, self._marked)
-        return change / (4.0 * scale)
 
     def _load(self, subdomain: Subdomain) -> np.ndarray:
         """Return the change of the nodal forces of a subdomain.

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._pairing.inside import InsideOf
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.parts import slave_of, surface_of
 from fenics_contact._surfaces.facets import FacetedSurface, has_midside_pressure, heights, shape_functions
@@ -15,7 +18,7 @@ from fenics_contact.design.objective import Partials
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.mesh.cell_types import FACET_TYPES, quadrature
-from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
 from fenics_contact.shapes.simple import evaluate_shape
 
 
@@ -62,7 +65,7 @@ class Places:
 class _Slave:
     """The slave of a pair with values of contact points at its nodes."""
 
-    def __init__(self, state: LinearState, index: int) -> None:
+    def __init__(self, state: State, index: int) -> None:
         """Find the nodes of the points of a pair."""
         torn, pair = state.torn, state.torn.scene.contacts[index]
         self.surface = slave_of(torn.scene, pair, pair.slave_geometry)
@@ -82,7 +85,7 @@ class _Slave:
         result[self.place] = values[self.mine]
         return np.asarray(self._fill @ result)
 
-    def facets(self, state: LinearState, weight: np.ndarray) -> np.ndarray:
+    def facets(self, state: State, weight: np.ndarray) -> np.ndarray:
         """Return this rank's share of the facets all of whose nodes have points, and one of them a weight."""
         comm, known = state.torn.decomposition.comm, self.at_nodes(np.ones(state.torn.points.count)) > 0.0
         facets = self.surface.facets
@@ -90,7 +93,37 @@ class _Slave:
         return np.asarray(np.flatnonzero(chosen)[comm.rank :: comm.size])
 
 
-def between_nodes(state: LinearState, multiplier: np.ndarray, opening: float) -> float:
+def at_rest(state: State, index: int, slave: _Slave, facets: np.ndarray) -> tuple[Places, np.ndarray]:
+    """Return points of facets where bodies move little, with gaps along the normals of undeformed ones."""
+    decomposition, field = state.torn.decomposition, state.conforming_displacement
+    own = nodal_mean_at(decomposition, field, slave.nodes)[:, : slave.surface.dim]
+    places = Places.of(slave.surface, facets)
+    along = places.values @ slave.at_nodes(state.torn.points.normal)
+    found, gap, normal, theirs = _opposite(state, state.scene.contacts[index], places, along)
+    places = places.part(found)
+    closing = places.values @ own - theirs[:, : slave.surface.dim]
+    return places, gap + np.einsum("nd,nd->n", normal, closing)
+
+
+def where_they_are(state: Any, index: int, slave: _Slave, facets: np.ndarray) -> tuple[Places, np.ndarray]:
+    """Return points of facets of moved bodies, as far off them as of undeformed ones, and the gaps there.
+
+    `state`: a `DeformedState`.
+    """
+    inside = InsideOf.of(state.scene, state.scene.contacts[index])
+    inside = state.equilibrium.evaluation.contact.where_they_are(inside, index)
+    places, height = Places.of(inside.slave, facets), Places.of(slave.surface, facets).height
+    with together(state.torn.decomposition.comm):
+        met = inside.master.met(places.points + height[:, None] * places.normal, places.normal)
+    found = np.flatnonzero(np.isfinite(met.distance))
+    return places.part(found), met.distance[found]
+
+
+#: Returns points on some facets of the slave of a pair that face its master, and the gaps there. Collective.
+Faced: TypeAlias = "Callable[[State, int, _Slave, np.ndarray], tuple[Places, np.ndarray]]"
+
+
+def between_nodes(state: State, multiplier: np.ndarray, opening: float, faced: Faced = at_rest) -> float:
     """Return Σ ∫ ζ (g + n·(u_s − u_m) − r) over the slaves of all pairs. Collective.
 
     Contact holds at nodes, or as a mean: between them facets of one surface enter the other one, or leave
@@ -98,7 +131,8 @@ def between_nodes(state: LinearState, multiplier: np.ndarray, opening: float) ->
     contact points; the gap g and the normal n are those of the true surfaces in each point. `multiplier`:
     forces ζ of an adjoint, owned; `opening`: share of the gaps at open nodes that is not part of r. The rim
     of the contact lies somewhere between closed and open nodes, and forces that do not vanish there work on
-    the gaps within it: half of them, on average.
+    the gaps within it: half of them, on average. `faced`: `at_rest`, or `where_they_are` for bodies that have
+    moved far.
     """
     torn, total = state.torn, 0.0
     pressing, residual = (
@@ -107,28 +141,19 @@ def between_nodes(state: LinearState, multiplier: np.ndarray, opening: float) ->
     missed = np.where(state.contact.normal_force > 0.0, residual, (1.0 - opening) * residual)
     for index, pair in enumerate(torn.scene.contacts):
         if not pair.is_self_contact:
-            total += _of_pair(state, index, pair, pressing, missed)
+            total += _of_pair(state, index, pressing, missed, faced)
     return float(torn.decomposition.comm.allreduce(total))
 
 
-def _of_pair(
-    state: LinearState, index: int, pair: ContactPair, pressing: np.ndarray, residual: np.ndarray
-) -> float:
-    torn, slave = state.torn, _Slave(state, index)
-    decomposition, points, field = torn.decomposition, torn.points, state.conforming_displacement
+def _of_pair(state: State, index: int, pressing: np.ndarray, residual: np.ndarray, faced: Faced) -> float:
+    slave, points = _Slave(state, index), state.torn.points
     if has_midside_pressure(slave.surface.bearing):
         return 0.0  # without forces at the corners; the error of quadratic facets is small
-    weight = slave.at_nodes(pressing / points.area)
+    weight = slave.at_nodes(pressing / state.contact.area)
     # Where a pair gives other gaps than the measured ones, the difference is interpolated.
     missed = slave.at_nodes(residual - (points.gap - points.distance))
-    own = nodal_mean_at(decomposition, field, slave.nodes)[:, : slave.surface.dim]
-    places = Places.of(slave.surface, slave.facets(state, weight))
-    along = places.values @ slave.at_nodes(points.normal)
-    found, gap, normal, theirs = _opposite(state, pair, places, along)
-    places = places.part(found)
-    closing = places.values @ own - theirs[:, : slave.surface.dim]
-    opened = gap + np.einsum("nd,nd->n", normal, closing) - places.values @ missed
-    return float(places.weight * (places.values @ weight) @ opened)
+    places, gap = faced(state, index, slave, slave.facets(state, weight))
+    return float(places.weight * (places.values @ weight) @ (gap - places.values @ missed))
 
 
 def _nearest(
@@ -160,7 +185,7 @@ def _along(
 
 
 def _opposite(
-    state: LinearState, pair: ContactPair, places: Places, along: np.ndarray
+    state: State, pair: ContactPair, places: Places, along: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return which points face the master, their gaps and normals, and how it moves there. Collective."""
     torn, scene, field = state.torn, state.torn.scene, state.conforming_displacement
@@ -186,7 +211,7 @@ def _opposite(
     return every, gap, normal, moved
 
 
-def of_pressures(state: LinearState, partials: Partials) -> float:
+def of_pressures(state: State, partials: Partials) -> float:
     """Return by how much an objective changes from nodal forces per area to the pressures at the nodes.
 
     A nodal force λ_i = ∫ p φ_i is a mean of the pressure about the node. With M_ij = ∫ φ_i φ_j the pressure

@@ -21,21 +21,18 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import singledispatch
 from typing import ClassVar
 
 import numpy as np
 
-from fenics_contact._accuracy.discretisation import (
-    ErrorProducts,
-    OfCells,
-    discretisation_error,
-    error_products,
-)
+from fenics_contact._accuracy.discretisation import ErrorProducts, OfCells
 from fenics_contact._adaptive.boundary_errors import EnergyShares, between_facets
 from fenics_contact._adaptive.contact_residuals import between_nodes, of_pressures
+from fenics_contact._adaptive.deformed_parts import DeformedParts
 from fenics_contact._adaptive.estimates import ErrorEstimate
-from fenics_contact._adaptive.indicator import stress_indicator
+from fenics_contact._adaptive.state_parts import LinearParts, StateParts
 from fenics_contact._base.display import tabled
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import Task
@@ -58,8 +55,19 @@ from fenics_contact.design.objectives import (
 )
 from fenics_contact.design.sensitivity import adjoint_of
 from fenics_contact.errors import InvalidInputError, collectively
-from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.deformed_state import DeformedState
 from fenics_contact.results.state import State, comm_of
+
+
+@singledispatch
+def parts_of(state: State) -> StateParts:
+    """Return what errors of quantities of a state are made of: in small strain."""
+    return LinearParts(state)
+
+
+@parts_of.register
+def _(state: DeformedState) -> StateParts:
+    return DeformedParts(state)
 
 
 @tabled
@@ -99,8 +107,12 @@ def goal_error(
     resists (`State.unheld`) a quantity is that of bodies which stay on average over their volume. What
     earlier load steps add to the error is not included.
 
+    Where materials are nonlinear the adjoint is that of the tangent at the end of the load step, and products
+    of errors have the tangent moduli of each cell there: the estimate is of first order. Histories of
+    materials and friction count from the start of that step, which is taken as it is.
+
     Args:
-        state: The equilibrium; of nonlinear materials there is no adjoint.
+        state: The equilibrium, of small or of large deformations.
         objective: The quantity; one that has no adjoint gives the reason as its ``without_adjoint``.
         choice: Branch of weakly active points.
         tolerance: Relative residual of the adjoint.
@@ -122,38 +134,34 @@ def goal_error(
         forms = ShapeForms.at_rest(state.torn)
         with guarded_user_call(comm):
             value = finite_value(objective.value(state, forms))
-        if not isinstance(state, LinearState):
-            return _indicated(state, value)
-        linear = state
+        parts = parts_of(state)
         with guarded_user_call(comm):
-            if why := getattr(objective, "without_adjoint", ""):
-                return _without_adjoint(linear, value, why)
+            if why := parts.without_adjoint or getattr(objective, "without_adjoint", ""):
+                return _without_adjoint(parts, value, why)
             smooth = smoothed(objective, state, forms)
             partials = finite_partials(smooth.partials(state, forms))
-        # A state has no mean motion where nothing resists it, and the load of its adjoint none either.
-        at_rest = linear.dual.at_rest_transposed(partials.by_displacement)
-        partials = replace(partials, by_displacement=at_rest)
+        partials = parts.at_rest(partials)
         linearised = linearise_face(state, choice)
         try:
-            adjoint, of_solver, partials = adjoint_of(linear, partials, linearised, tolerance)
+            adjoint, of_solver, partials = adjoint_of(state, partials, linearised, tolerance)
         except NoAdjointError as error:
             _require_reached(state, objective, (value,), partials, 0.01 * tolerance)
-            return _without_adjoint(linear, value, str(error))
-        products = error_products(state.torn, linear.conforming_displacement, adjoint.displacement)
+            return _without_adjoint(parts, value, str(error))
         # J'' is that multiple of a; zero where it is not known.
         energies = getattr(smooth, "energies", (0.0, 0.0))
         weight = energies[0]
-        inside, shares = _in_cells(state, products, weight)
+        inside, shares = _in_cells(state, parts.products(adjoint.displacement), weight)
         # Adjoint forces of energies are multiples of the pressure, which vanishes at the rim of a contact.
-        between = between_nodes(linear, adjoint.multiplier, 0.0 if weight else 0.5)
-        others = between, of_pressures(linear, partials)
+        between = between_nodes(state, adjoint.multiplier, 0.0 if weight else 0.5, parts.faced)
+        others = between, of_pressures(state, partials)
         bound = _sum(comm, shares) + float(np.abs(others).sum())
         _require_reached(state, objective, (value, bound), partials, 0.01 * tolerance)
-        boundary, curved = between_facets(linear, adjoint.displacement, EnergyShares(*energies))
+        own = EnergyShares(*energies)
+        boundary, curved = between_facets(state, adjoint.displacement, own, parts.change_of_work())
         shares = _joined(shares, curved)
         bound += _sum(comm, curved)
-        geometry = _by_geometry(linear, adjoint) + boundary
-        friction = _by_friction(linear, partials, adjoint, linearised)
+        geometry = parts.by_gaps(adjoint) + boundary
+        friction = _by_friction(state, partials, adjoint, linearised)
     return GoalError(
         value, inside + sum(others), bound, geometry, of_solver.correction, "", comm, _sizes(state), shares,
         friction,
@@ -230,18 +238,7 @@ def _require_reached(
         )
 
 
-def _by_geometry(state: LinearState, adjoint: Adjoint) -> float:
-    """Return ζ·(g* − g), the effect of gaps g* between better known surfaces. Collective; no product."""
-    torn = state.torn
-    if not torn.points.count:
-        return 0.0
-    weight = torn.numbering.gather(adjoint.multiplier, torn.normal_rows)
-    return float(weight @ (torn.finer_gap() - torn.points.gap))
-
-
-def _by_friction(
-    state: LinearState, partials: Partials, adjoint: Adjoint, linearised: LinearisedFace
-) -> float:
+def _by_friction(state: State, partials: Partials, adjoint: Adjoint, linearised: LinearisedFace) -> float:
     """Return the effect of slip bounds that follow the normal forces instead of the solver's. Collective."""
     torn, rows = state.torn, state.rows
     by_bound = bound_sensitivity(torn, partials.by_multiplier, adjoint.displacement, linearised)
@@ -249,19 +246,9 @@ def _by_friction(
     return float(comm_of(state).allreduce(float(by_bound[torn.owned_discs] @ missed)))
 
 
-def _indicated(state: State, value: float) -> GoalError:
-    """Return unknown parts, and an indicator by cell. Collective."""
-    why = "there is no adjoint of large deformations and nonlinear materials, compare states on two meshes"
-    comm, nan = comm_of(state), float("nan")
-    shares = {}
-    for name, body in state.scene.bodies.items():
-        indicator = stress_indicator(state, name)
-        cells = np.arange(body.mesh.n_cells if comm.rank == 0 else 0)  # each cell counts once
-        shares[name] = cells, indicator[cells]
-    return GoalError(value, nan, nan, nan, nan, why, comm, _sizes(state), shares, nan)
-
-
-def _without_adjoint(state: LinearState, value: float, why: str) -> GoalError:
-    """Return unknown parts, and the energy norm by cell. Collective."""
-    energy, nan = discretisation_error(state.torn, state.conforming_displacement), float("nan")
-    return GoalError(value, nan, nan, nan, nan, why, comm_of(state), _sizes(state), energy.own_cells, nan)
+def _without_adjoint(parts: StateParts, value: float, why: str) -> GoalError:
+    """Return unknown parts, and what says of each cell that it is too large."""
+    state, nan = parts.state, float("nan")
+    return GoalError(
+        value, nan, nan, nan, nan, why, comm_of(state), _sizes(state), parts.indicators(), nan
+    )  # fmt: skip

@@ -13,6 +13,7 @@ from fenics_contact._scene.local_axes import free_part
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.objective import Partials, Weighable, require_linear
 from fenics_contact.design.objectives import on_rows, require_pair
+from fenics_contact.design.sensitivity import forces_by_places
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import at_copies
 from fenics_contact.feti.torn import TornSystem
@@ -48,7 +49,8 @@ class PairForce(Weighable):
         mine = state.contact.on_pair(self.pair)
         normal[mine] = points.normal[mine] @ along
         tangential[mine] = -points.tangents[mine] @ along
-        return Partials.of(state, value, by_multiplier=on_rows(state, normal, tangential))
+        turned = forces_by_places(state, self.pair, along)
+        return Partials.of(state, value, by_multiplier=on_rows(state, normal, tangential), **turned)
 
     def _along(self, state: State) -> np.ndarray:
         return np.array(unit_vector("PairForce.direction", self.direction, state.scene.components))

@@ -134,12 +134,18 @@ class MeanStrain(PointStrain):
 
 
 class GaussPoints:
-    """The Gauss points of one mesh: those of the package's forms on cells of this type."""
+    """The Gauss points of one mesh: those of the package's forms on cells of this type, or of a degree."""
 
-    def __init__(self, space: _dolfinx.fem.FunctionSpace, element: Element, points: np.ndarray) -> None:
+    def __init__(
+        self,
+        space: _dolfinx.fem.FunctionSpace,
+        element: Element,
+        points: np.ndarray,
+        degree: int = 0,
+    ) -> None:
         """Evaluate the gradients of the shape functions."""
         cell = element.cell
-        positions, weights = quadrature(cell, quadrature_degree(element))
+        positions, weights = quadrature(cell, degree or quadrature_degree(element))
         reference = shape_gradients(cell, positions)
         self._values = shape_values(cell, positions)
         self._shape, self._cells = points.shape, _dolfinx.vtk_cell_dofs(space)
@@ -154,9 +160,18 @@ class GaussPoints:
         """Numbers of cells and of points in each."""
         return self._weights.shape[0], self._weights.shape[1]
 
+    @property
+    def weights(self) -> np.ndarray:
+        """Volumes that belong to the points, shape (n_cells, n_gauss)."""
+        return self._weights
+
+    def within(self, values: np.ndarray) -> np.ndarray:
+        """Return values at the points by those at the nodes of cells, (n_cells, nodes of a cell, ...)."""
+        return np.einsum("qa,na...->nq...", self._values, values)
+
     def gradient(self, displacement: np.ndarray) -> np.ndarray:
         """Return ∂u_i/∂X_j in three dimensions, zero out of the plane, shape (n_cells, n_gauss, 3, 3)."""
-        return self._gradients.of(displacement.reshape(self._shape)[self._cells])
+        return self._gradients.of(displacement.reshape(self._shape[0], -1)[self._cells])
 
     def interpolated(self, nodal: np.ndarray) -> np.ndarray:
         """Return a scalar field at the points, (n_cells, n_gauss), of its values by block, (n,)."""

@@ -15,6 +15,7 @@ from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.objective import Partials, Weighable
 from fenics_contact.design.objectives import nothing_touches, on_normal_rows, require_pair
+from fenics_contact.design.sensitivity import by_true_areas
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.results.state import State
 
@@ -58,7 +59,9 @@ class PeakPressure(Weighable):
                 "PeakPressure has no derivative by the shape: take LargestPressure or PressureNorm"
             )
         value, by_force = self._weights(state)
-        return Partials.of(state, value, by_multiplier=on_normal_rows(state, by_force))
+        by_area = -by_force * state.contact.normal_force / state.contact.area
+        by_multiplier = on_normal_rows(state, by_force)
+        return Partials.of(state, value, by_multiplier=by_multiplier, **by_true_areas(state, by_area))
 
     def _weights(self, state: State) -> tuple[float, np.ndarray]:
         """Return the peak and its derivatives by the normal forces, shape (n_points,)."""

@@ -45,14 +45,20 @@ if TYPE_CHECKING:
     from fenics_contact._pairing.sliding.points import SlidingPoints
 
 
+def _moved_contact(state: State) -> MovedContact | None:
+    """Return the contact of a state whose bodies deform much, None of others."""
+    contact = state.equilibrium.evaluation.contact if isinstance(state, DeformedState) else None
+    return contact if isinstance(contact, MovedContact) else None
+
+
 def by_true_areas(state: State, by_area: np.ndarray) -> dict[str, np.ndarray]:
     """Return partial derivatives of an objective, by their names in `Partials`. Collective.
 
     Areas of the undeformed slave change with the shape alone. Those of a deformed one change with the places
     x = X + u of its nodes, by mortar also with the master's: with the displacement and the shape alike.
     """
-    moved = state.equilibrium.evaluation.contact if isinstance(state, DeformedState) else None
-    if not isinstance(moved, MovedContact):
+    moved = _moved_contact(state)
+    if moved is None:
         return {"by_area": by_area}
     torn, points = state.torn, moved.points
     by_now, by_before, by_met = points.areas(torn.scene).pulled_back(by_area)
@@ -69,6 +75,41 @@ def by_true_areas(state: State, by_area: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
+def forces_by_places(state: State, pair: int, along: np.ndarray) -> dict[str, np.ndarray]:
+    """Return derivatives of a pair's force on its slave at fixed multipliers, by `Partials`. Collective.
+
+    Directions of the forces on undeformed bodies are fixed; those on moved ones turn with the surfaces.
+    `along`: direction of the force, shape (components,).
+    """
+    moved = _moved_contact(state)
+    if moved is None:
+        return {}
+    torn, points = state.torn, moved.points
+    mine = points.points.pair == pair
+    normal, friction = (
+        np.where(mine.reshape(-1, *(1,) * (each.ndim - 1)), each, 0.0)
+        for each in moved.at_points(state.solution.multiplier)
+    )
+    field = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
+    field[np.unique(points.points.slave[mine])] = along
+    by_places = _by_turning(points, (normal, friction), np.zeros(len(normal)), field.ravel())
+    every = np.arange(len(field))
+    free = free_part(
+        by_places.reshape(field.shape), every, ~np.isnan(moved.prescribed), torn.decomposition.axes
+    )
+    return {"by_displacement": nodal_mean_transposed(torn.decomposition, every, free)}
+
+
+def _by_turning(
+    points: SlidingPoints, forces: tuple[np.ndarray, np.ndarray], by_gap: np.ndarray, w: np.ndarray
+) -> np.ndarray:
+    """Return −wᵀ ∂(Bᵀλ)/∂x and ζᵀ ∂g/∂x of normal gaps by the places of all nodes."""
+    normal, friction = np.maximum(forces[0], 0.0), forces[1]
+    turning, rubbing = points.stiffness(normal), points.friction_stiffness(friction)
+    by_nodes = -turning.assembled() @ w - rubbing.right @ (rubbing.left.T @ w) + points.gap_rows.T @ by_gap
+    return np.asarray(by_nodes + points.means_pulled_back(normal, friction, by_gap, w))
+
+
 def solve_deformed_adjoint(
     state: DeformedState,
     partials: Partials,
@@ -82,7 +123,7 @@ def solve_deformed_adjoint(
     Its tangents are factored once more at the state itself, with the stiffness of forces that turn with their
     surfaces; the columns of the face's two bases are swapped.
     """
-    _require_differentiable(state)
+    require_differentiable(state)
     evaluation, torn = state.equilibrium.evaluation, state.torn
     exact = evaluation.linearised(PhaseTimer(), state.equilibrium.linearisation)
     system, tangent = exact.system, exact.problem(evaluation)
@@ -96,7 +137,9 @@ def solve_deformed_adjoint(
     if found is None:
         raise NoAdjointError.of_loose_body()
     if found.stop is not Stop.CONVERGED:
-        raise ConvergenceError(
+        # Of a load outside the range of a singular operator rounding decides which of both is found.
+        singular = found.stop in (Stop.NO_CURVATURE, Stop.STAGNATION)
+        raise (NoAdjointError if singular else ConvergenceError)(
             f"the adjoint needs a relative residual below {tolerance:.1e}, not reached by {found.products} "
             f"products ({found.stop.value}): loosen the tolerance"
         )
@@ -105,7 +148,7 @@ def solve_deformed_adjoint(
     return Adjoint(moved + system.kernel @ found.motions, multiplier, found.motions, found.products)
 
 
-def _require_differentiable(state: DeformedState) -> None:
+def require_differentiable(state: DeformedState) -> None:
     """Reject free rigid surfaces, fluid on other masters, and friction that needs more than the start."""
     torn, contact = state.torn, state.equilibrium.evaluation.contact
     if free := state.equilibrium.evaluation.load.free_tools:
@@ -149,9 +192,7 @@ def deformed_contact_by_shape(
     points = contact.points
     (normal, friction), (by_gap, by_slip) = (contact.at_points(each) for each in fields.multipliers)
     w = _on_surfaces(torn, points, fields.displacements[0])
-    turning, rubbing = points.stiffness(np.maximum(normal, 0.0)), points.friction_stiffness(friction)
-    by_nodes = -turning.assembled() @ w - rubbing.right @ (rubbing.left.T @ w) + points.gap_rows.T @ by_gap
-    by_nodes += points.means_pulled_back(np.maximum(normal, 0.0), friction, by_gap, w)
+    by_nodes = _by_turning(points, (normal, friction), by_gap, w)
     if by_slip.any() and isinstance(state.begun, MovedContact):
         start = state.begun.points
         rows = points.slip_rows(start.material_points()) + points.slip_by_start(start)

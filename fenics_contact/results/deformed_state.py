@@ -36,8 +36,8 @@ class DeformedState(State):
 
     Forces, gaps and stresses (Cauchy's) are those of the deformed bodies, where no material is made for that
     those of the undeformed ones, as in linear elasticity. Moments are those of the deformed places of bodies
-    that deform much, and of the undeformed places of all others. Errors are not estimated: compare states on
-    two meshes.
+    that deform much, and of the undeformed places of all others. Errors are estimated of quantities, by
+    `fenics_contact.goal_error`; there are no bounds.
 
     Attributes:
         equilibrium: Displacement, forces and history of the materials.
@@ -77,7 +77,7 @@ class DeformedState(State):
         return row_values_at(self.equilibrium)
 
     def _errors_in_words(self) -> dict[str, str]:
-        return {"errors": "not estimated where materials are nonlinear: compare two meshes"}
+        return {"errors": "of nonlinear materials those of quantities, by goal_error; or compare two meshes"}
 
     @cached_property
     @collectively("DeformedState.conforming_displacement", comm_of)

@@ -65,9 +65,9 @@ def test_forces_of_adjoints_work_on_half_of_the_gaps_but_those_of_energies_on_no
     """Those of energies are multiples of the pressure, zero where nodes are open."""
     asked: list[float] = []
 
-    def watched(state: LinearState, multiplier: np.ndarray, share: float) -> float:
+    def watched(state: LinearState, multiplier: np.ndarray, share: float, *others: Any) -> float:
         asked.append(share)
-        return between_nodes(state, multiplier, share)
+        return between_nodes(state, multiplier, share, *others)
 
     monkeypatch.setattr(goal_errors, "between_nodes", watched)
     goal_error(pressed(5.0), objective)

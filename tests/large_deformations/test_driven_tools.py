@@ -36,7 +36,7 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact._large_deformations.rigid_surfaces import TurnedSurface
-from fenics_contact.design.sensitivity import _require_differentiable
+from fenics_contact.design.sensitivity import require_differentiable
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, PlaneStrain
@@ -349,7 +349,7 @@ def test_histories_with_free_tools_go_on_from_a_checkpoint(tmp_path: Path) -> No
 def test_derivatives_need_prescribed_motions(tilted: State) -> None:
     assert isinstance(tilted, DeformedState)
     with pytest.raises(InvalidInputError, match=r"is prescribed, but that of \[.disc.\] has free"):
-        _require_differentiable(tilted)
+        require_differentiable(tilted)
 
 
 def test_a_plane_that_is_free_to_move_presses_a_ring_from_above() -> None:

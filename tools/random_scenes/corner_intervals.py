@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -12,6 +13,7 @@ from fenics_contact import Limits, quantity, solve_to
 from fenics_contact.errors import ConvergenceError, FenicsContactError
 from tools.random_scenes.corners import Corners, corners
 from tools.random_scenes.judge import Outcome, Verdict, placed
+from tools.random_scenes.nonlinear import nonlinear
 
 #: Accuracies that are asked for.
 ACCURACIES = (0.1, 0.05, 0.02, 0.01)
@@ -21,11 +23,21 @@ MOST = 5000
 
 def judge_corners(seed: int) -> Verdict:
     """Compute a quantity of a scene to an accuracy, and compare it with graded meshes of quadratic cells."""
+    return _judged(seed, corners(seed), MOST)
+
+
+def judge_nonlinear(seed: int) -> Verdict:
+    """The same of rubber, metal and large sliding; the detail has processor seconds, too."""
+    return _judged(seed, nonlinear(seed), 2000, layers=2, widest=0.12)
+
+
+def _judged(seed: int, made: Corners, most: int, **finest: float) -> Verdict:
+    """Judge a scene; `most`: unknowns of the last mesh; `finest`: of `Corners.reference`."""
     start = time.perf_counter()
     logging.getLogger("fenics_contact").setLevel(logging.ERROR)
-    made = corners(seed)
+    accuracy = ACCURACIES[seed // 2 % len(ACCURACIES)]
     try:
-        outcome, detail, share, products = _ended(made, ACCURACIES[seed // 2 % len(ACCURACIES)])
+        outcome, detail, share, products = _ended(made, accuracy, most, finest)
     except ConvergenceError as error:
         outcome, detail, share, products = Outcome.NOT_CONVERGED, str(error), 0.0, 0
     except FenicsContactError as error:
@@ -36,13 +48,16 @@ def judge_corners(seed: int) -> Verdict:
     return Verdict(seed, outcome, made.words, detail, seconds, products, share)
 
 
-def _ended(made: Corners, accuracy: float) -> tuple[Outcome, str, float, int]:
+def _ended(
+    made: Corners, accuracy: float, most: int, finest: dict[str, Any]
+) -> tuple[Outcome, str, float, int]:
     scene, (name, where) = made.start(), made.quantity
-    limits = Limits(levels=15, unknowns=MOST)
+    limits, began = Limits(levels=15, unknowns=most), time.process_time()
     found = solve_to(scene, quantity(name, scene, **where), accuracy, MPI.COMM_SELF, limits=limits)
     if not np.isfinite(found.error):
         return Outcome.REFUSED, f"{name}: {found.reason[:60]}", 0.0, 0
-    reference, doubt = made.reference()
+    spent = time.process_time() - began
+    reference, doubt = made.reference(**finest)
     if doubt > 0.5 * found.error:
         return Outcome.REFUSED, "the reference is not known well enough", 0.0, 0
     off = abs(found.value - reference)
@@ -51,7 +66,7 @@ def _ended(made: Corners, accuracy: float) -> tuple[Outcome, str, float, int]:
     steps = " ".join(f"{level.value:.6g}±{level.error:.2g}" for level in found.levels)
     detail = (
         f"{steps}; graded {reference:.6g}±{doubt:.1g}; {accuracy:g} wanted, reached: {found.reached}, "
-        f"{found.levels[-1].unknowns} unknowns"
+        f"{found.levels[-1].unknowns} unknowns, {spent:.2f} s"
     )
     share = off / found.error if found.error > 0.0 else 0.0
     products = max(level.products for level in found.levels)

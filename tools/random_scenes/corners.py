@@ -29,7 +29,7 @@ from fenics_contact import (
 )
 from fenics_contact._adaptive.goal_errors import value_of
 from fenics_contact.gallery import rectangle_lattice
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.materials import Material, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.mesh.faces import boundary_faces
 from tools.random_scenes.dice import Dice
@@ -70,11 +70,13 @@ class Blocks:
         lines: Coordinates of the sides of blocks along x and y, (m + 1,) and (n + 1,), [length].
         modulus: Young's modulus of each block, zero where there is none, shape (m, n).
         poisson: Poisson's ratio.
+        law: Returns a material by its Young's modulus and Poisson's ratio.
     """
 
     lines: tuple[np.ndarray, np.ndarray]
     modulus: np.ndarray
     poisson: float
+    law: Callable[[float, float], Material] = PlaneStrain
 
     def body(self, ticks: Ticks, cell: str, order: int, more: tuple[float, ...] = ()) -> Body:
         """Return the body on a mesh; `more`: lines along x that it has, too."""
@@ -87,7 +89,7 @@ class Blocks:
         left = quadratic(left) if order == 2 else left
         values, part = np.unique(modulus[modulus > 0.0], return_inverse=True)
         regions = {f"E{k}": np.flatnonzero(part == k) for k in range(len(values))}
-        materials = {f"E{k}": PlaneStrain(value, self.poisson) for k, value in enumerate(values)}
+        materials = {f"E{k}": self.law(value, self.poisson) for k, value in enumerate(values)}
         whole = BodyMesh(left.points, left.cells, left.surfaces, regions=regions)
         return Body(whole, materials if len(values) > 1 else materials["E0"])
 
@@ -122,6 +124,7 @@ class Corners:
         quantity: Name of the quantity, and what it takes.
         coarse: Cells along a block, their type and order.
         more: Lines along x of reference meshes, where a contact may end.
+        tolerance: Residual of the states on these.
     """
 
     words: str
@@ -131,6 +134,7 @@ class Corners:
     quantity: tuple[str, Mapping[str, Any]]
     coarse: tuple[int, str, int]
     more: tuple[float, ...] = ()
+    tolerance: float = 1e-9
 
     def start(self) -> Scene:
         """Return the scene on its coarse mesh."""
@@ -145,7 +149,7 @@ class Corners:
         """Return the quantity on a graded mesh of quadratic cells."""
         scene = self._on(graded(layers, ratio, widest), "quadrilateral", 2, self.more)
         name, where = self.quantity
-        state = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9).solve()
+        state = ContactProblem(scene, MPI.COMM_SELF, tolerance=self.tolerance).solve()
         return float(value_of(state, quantity(name, scene, **where)))
 
     def reference(self, layers: int = 6, widest: float = 0.05) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import IO
 
 from fenics_contact import clean_environment
-from tools.random_scenes.corner_intervals import judge_corners
+from tools.random_scenes.corner_intervals import judge_corners, judge_nonlinear
 from tools.random_scenes.deformed_judge import judge_history
 from tools.random_scenes.intervals import judge_interval
 from tools.random_scenes.judge import Outcome, Verdict, judge, judge_revolved
@@ -28,11 +28,12 @@ ROOT = Path(__file__).parents[2]
 PATIENCE = 40.0
 Judge = Callable[[int], Verdict]
 #: Scenes of small strain and linear materials, those of revolution, and histories of large deformations;
-#: intervals of quantities, and of scenes with corners and contrasts; scenes in which features meet,
-#: written in two ways.
+#: intervals of quantities, and of scenes with corners and contrasts, of rubber, metal and large sliding;
+#: scenes in which features meet, written in two ways.
 JUDGES: dict[str, Judge] = {
     "linear": judge, "revolved": judge_revolved, "deformed": judge_history, "intervals": judge_interval,
     "corners": judge_corners, "meetings": judge_meeting,
+    "nonlinear": judge_nonlinear,
 }  # fmt: skip
 #: Begins the lines that a worker writes; libraries may write others.
 MARK = "verdict: "
