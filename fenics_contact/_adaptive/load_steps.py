@@ -58,9 +58,8 @@ def solve_steps_to(
         The results of the steps; one whose accuracy was not reached says so, and a warning.
 
     Raises:
-        InvalidInputError: As `solve_to`, or if a history cannot be carried to other meshes: of contact
-            between bodies that deform much, of friction by slip, of fluid that enters contacts, of preloads
-            in scenes with nonlinear materials.
+        InvalidInputError: As `solve_to`, or if a history cannot be carried to other meshes: of friction by
+            slip, of fluid that enters contacts, of preloads in scenes with nonlinear materials.
         InfeasibleError: If nothing holds some body against its load.
         ConvergenceError: If the solver does not reach its tolerance on some mesh.
 

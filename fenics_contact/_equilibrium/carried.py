@@ -57,18 +57,13 @@ class TransferredState:
         """Reject what cannot be carried to the meshes of a scene.
 
         Raises:
-            InvalidInputError: If the transfers lead to other meshes, or a history is not carried: of contact
-                between bodies that deform much, of friction by slip, of fluid in contacts, of preloads in
-                scenes with nonlinear materials.
+            InvalidInputError: If the transfers lead to other meshes, or a history is not carried: of friction
+                by slip, of fluid in contacts, of preloads in scenes with nonlinear materials.
         """
         self.fields.check(scene)
-        others = {
-            "contact of bodies that deform much": bool(scene.contacts) and scene.deforms_much,
-            "preloads in scenes with nonlinear materials": bool(scene.preloads) and scene.is_nonlinear,
-        }
-        what = [loop.name for loop in outer_loops(scene)] + [
-            words for words, there in others.items() if there
-        ]
+        what = [loop.name for loop in outer_loops(scene)]
+        if scene.preloads and scene.is_nonlinear:
+            what.append("preloads in scenes with nonlinear materials")
         if what:
             raise InvalidInputError(
                 f"load steps on other meshes carry histories, but not that of {what[0]}: keep the meshes"
@@ -84,6 +79,12 @@ class TransferredState:
         `torn`: the system of `scene_on` the new meshes.
         """
         return torn.slip_origin(self.fields.displacement(torn), self.multiplier(torn))
+
+    def slip_at(self, torn: TornSystem) -> np.ndarray:
+        """Return the slip of all steps at the points of a system in their tangents, (n, dim − 1)."""
+        contact, tangents = self.state.contact, torn.points.tangents
+        vectors = np.einsum("na,nad->nd", contact.total_slip, contact.points.tangents)
+        return np.einsum("nd,nad->na", self.fields.at_points(torn, vectors), tangents)
 
     def multiplier(self, torn: TornSystem) -> np.ndarray:
         """Return forces at contact, owned, zero on all other rows: as a start, and for elastic slip."""

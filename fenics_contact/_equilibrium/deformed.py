@@ -14,7 +14,7 @@ from fenics_contact._equilibrium.between_nodes import InsideFacets, needed_nodes
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.other_rows import prescribed_as_is
 from fenics_contact._equilibrium.outer_loops import outer_loops
-from fenics_contact._equilibrium.previous import ONLY_STEP, AfterTransfer, Previous, Wanted
+from fenics_contact._equilibrium.previous import ONLY_STEP, AfterTransfer, Previous, Undeformed, Wanted
 from fenics_contact._equilibrium.starts import CoarseStart
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
@@ -138,10 +138,10 @@ class DeformedEquilibria:
             raise InfeasibleError(unresisted_in_words(self._unresisted)) from failure
         except PathEndsError as failure:
             _require_more_than_springs(load.torn, failure)
-            last = None if failure.path is None else _state_after(failure.path, before, timer, steps)
+            last = None if failure.path is None else _state_after(failure.path, previous, timer, steps)
             words = f"{wanted.where}{failure}{advice(scene, last or before)}"
             raise LoadStepError(words, failure.history, last) from failure
-        return _state_after(path, before, timer, steps)
+        return _state_after(path, previous, timer, steps)
 
     def _start(self, scene: Scene, previous: Previous) -> _FromRest | _FromState:
         """Return where a load step begins. Collective."""
@@ -412,14 +412,14 @@ def _require_elastic(scene: Scene) -> None:
         )
 
 
-def _state_after(path: Path, before: State | None, timer: PhaseTimer, steps: AutomaticSteps) -> DeformedState:
+def _state_after(path: Path, previous: Previous, timer: PhaseTimer, steps: AutomaticSteps) -> DeformedState:
     """Return the state at the end of a path from another state. Collective."""
     at = path.end.evaluation.contact
+    before = previous.before if isinstance(previous.last, DeformedState) else Undeformed()
 
     def earlier_slip(points: SlidingPoints) -> np.ndarray:
-        if not isinstance(before, DeformedState):
-            return np.zeros((points.points.count, points.points.tangents.shape[1]))
-        return before.equilibrium.evaluation.contact.slip_on(points, before.contact.total_slip)
+        there, slip = before.slipped(path.begun)
+        return there.slip_on(points, slip)
 
     def of_step(contact: ContactResult) -> ContactResult:
         moved = replace(contact, **at.of_step(contact.friction_force, path.start, earlier_slip))

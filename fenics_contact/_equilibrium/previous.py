@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from fenics_contact._equilibrium.carried import TransferredState
 from fenics_contact._equilibrium.other_rows import (
@@ -75,6 +77,14 @@ class Undeformed:
     def check(self, scene: Scene) -> None:
         """Reject what cannot be carried to the meshes of a scene."""
 
+    def slipped(self, begun: Any) -> tuple[Any, np.ndarray]:
+        """Return contact of bodies that deform much, and the slip there before the load step. Collective.
+
+        `begun`: the contact where the step begins.
+        """
+        points = begun.torn.points
+        return begun, np.zeros((points.count, points.tangents.shape[1]))
+
     def kept(self, scene: Scene) -> Scene:
         """Return a scene with what supports and joints keep from the load step before. Collective."""
         return continued(scene, {})
@@ -97,6 +107,10 @@ class AfterState:
     def check(self, scene: Scene) -> None:
         for loop in outer_loops(self.last.scene):
             loop.check(self.last, scene)
+
+    def slipped(self, begun: Any) -> tuple[Any, np.ndarray]:
+        before: Any = self.last
+        return before.equilibrium.evaluation.contact, before.contact.total_slip
 
     def kept(self, scene: Scene) -> Scene:
         return continued(with_kept(scene, self.last), kept_by_joints(self.last))
@@ -125,6 +139,9 @@ class AfterTransfer:
 
     def check(self, scene: Scene) -> None:
         self.before.check(scene)
+
+    def slipped(self, begun: Any) -> tuple[Any, np.ndarray]:
+        return begun, self.before.slip_at(begun.torn)
 
     def kept(self, scene: Scene) -> Scene:
         return continued(scene, kept_by_joints(self.before.state))

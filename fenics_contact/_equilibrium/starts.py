@@ -183,23 +183,28 @@ class CoarseStart:
 
     def contact_forces(self, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
         """Return normal forces, (n,), and friction in space, (n, dim), of interpolated tractions."""
-        points, contact, coarse = torn.points, self.state.contact, self.state.torn
+        points, contact = torn.points, self.state.contact
         pressing = contact.normal_force[:, None]
         friction = pressing * contact.points.normal - contact.force
-        traction = np.hstack([pressing, friction]) / contact.area[:, None]
-        forces = np.zeros((points.count, 1 + torn.components))
+        forces = self.at_points(torn, np.hstack([pressing, friction]) / contact.area[:, None])
+        forces *= points.area[:, None]
+        return np.maximum(forces[:, 0], 0.0), forces[:, 1:]
+
+    def at_points(self, torn: TornSystem, known: np.ndarray) -> np.ndarray:
+        """Return values at contact points by those at the points of the state, both (n, k)."""
+        points, contact, coarse = torn.points, self.state.contact, self.state.torn
+        found = np.zeros((points.count, known.shape[1]))
         for number, pair in enumerate(torn.scene.contacts):
             mine, body = np.flatnonzero(points.pair == number), pair.slave.body
             first, before = (each.decomposition.tearing.first_of(body) for each in (torn, coarse))
-            nodes, values = contact.points.of_surface(number, traction)
-            nodal = np.zeros((self.state.scene.bodies[body].mesh.n_nodes, traction.shape[1]))
+            nodes, values = contact.points.of_surface(number, known)
+            nodal = np.zeros((self.state.scene.bodies[body].mesh.n_nodes, known.shape[1]))
             nodal[nodes - before] = values
             mesh = self.state.scene.bodies[body].mesh
             if mesh.hanging:
                 nodal = mesh.hanging.filled_in(nodal, mesh.surfaces[pair.slave.name], nodes - before)
-            forces[mine] = self._to_fine(torn.scene, body, nodal)[points.slave[mine] - first]
-        forces *= points.area[:, None]
-        return np.maximum(forces[:, 0], 0.0), forces[:, 1:]
+            found[mine] = self._to_fine(torn.scene, body, nodal)[points.slave[mine] - first]
+        return found
 
     def _to_fine(self, scene: Scene, name: str, nodal: np.ndarray) -> np.ndarray:
         """Return values at the nodes of a fine mesh for those at the nodes of the coarse one."""

@@ -16,6 +16,8 @@ from mpi4py import MPI
 from fenics_contact import (
     AccurateResult,
     Body,
+    BodyMesh,
+    ContactPair,
     ContactProblem,
     Coulomb,
     DeformedState,
@@ -24,11 +26,13 @@ from fenics_contact import (
     Limits,
     LoadStep,
     Preload,
+    RigidSphere,
     Scene,
     Section,
     SlipTable,
     State,
     Support,
+    Surface,
     TransferredState,
     gallery,
     quantity,
@@ -242,15 +246,43 @@ def test_histories_that_are_not_carried_are_refused() -> None:
         "fluid that enters contacts": replace(
             scene, contacts=[replace(pair, friction=None, fluid=FluidPressure(1.0, enters=outside))]
         ),
-        "contact of bodies that deform much": replace(
-            scene, bodies={"block": replace(scene.bodies["block"], material=NeoHooke(1.0, 0.3))}
-        ),
         "preloads in scenes with nonlinear materials": Scene({"block": plate}, preloads=drawn),
     }
     for what, each in cases.items():
         known = cast("State", SimpleNamespace(scene=each))
         with pytest.raises(InvalidInputError, match=f"carry histories, but not that of {what}"):
             TransferredState(known, {}).check(each)
+
+
+def rubbed(mesh: BodyMesh, along: float, down: float) -> Scene:
+    """Rubber on a roller that it slides along."""
+    pair = ContactPair(Surface("pad", "y0"), RigidSphere((1.0, -2.0), 2.0), Coulomb(0.4))
+    held = [Support("pad", "y1", (along, -down))]
+    return Scene({"pad": Body(mesh, NeoHooke(1.0, 0.3))}, held, contacts=[pair])
+
+
+def test_slip_of_bodies_that_deform_much_is_carried() -> None:
+    """On the same meshes nothing is lost; on finer ones the force is that of a history on these."""
+    coarse = gallery.rectangle((0, 0), (2, 1), (8, 4), cell="triangle")
+    finer = refined(coarse, np.arange(coarse.n_cells))
+    ways = [(0.0, 0.2), (0.3, 0.2), (0.1, 0.2)]
+
+    def ended(mesh: BodyMesh, way: tuple[float, float], before: State | TransferredState | None) -> State:
+        return ContactProblem(rubbed(mesh, *way), SELF, tolerance=1e-10).solve(before=before)
+
+    first = ended(coarse, ways[1], ended(coarse, ways[0], None))
+    whole, carried = (ended(coarse, ways[2], each) for each in (first, TransferredState(first, {})))
+    np.testing.assert_allclose(carried.contact.force, whole.contact.force, atol=1e-8)
+    np.testing.assert_allclose(carried.contact.total_slip, whole.contact.total_slip, atol=1e-8)
+    assert np.abs(whole.contact.slip_before).max() > 0.1
+    moved = ended(finer.mesh, ways[2], TransferredState(first, {"pad": MeshTransfer(new=[finer])}))
+    fine = ended(finer.mesh, ways[2], ended(finer.mesh, ways[1], ended(finer.mesh, ways[0], None)))
+    along = [each.contact.force.sum(axis=0)[0] for each in (whole, moved, fine)]
+    assert abs(along[1] - along[2]) < 0.5 * abs(along[0] - along[2])
+    pressing = (moved.contact.normal_force > 0.0) & (fine.contact.normal_force > 0.0)
+    slips = [each.contact.total_slip[pressing].mean() for each in (moved, fine)]
+    assert slips[0] == pytest.approx(slips[1], rel=0.1)
+    assert slips[1] > 0.05
 
 
 def test_transfers_lead_from_the_meshes_of_the_state_to_those_of_the_scene() -> None:

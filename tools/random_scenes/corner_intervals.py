@@ -28,7 +28,7 @@ def judge_corners(seed: int) -> Verdict:
 
 def judge_nonlinear(seed: int) -> Verdict:
     """The same of rubber, metal and large sliding; the detail has processor seconds, too."""
-    return _judged(seed, nonlinear(seed), 2000, layers=2, widest=0.12)
+    return _judged(seed, nonlinear(seed), 2000, layers=2, widest=0.2)
 
 
 def _judged(seed: int, made: Corners, most: int, **finest: float) -> Verdict:

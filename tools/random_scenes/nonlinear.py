@@ -61,7 +61,7 @@ def _any(dice: Dice) -> tuple[Law, float]:
     """Choose a law, and a strain up to which it is deformed."""
     if dice.chance(0.3):
         return _metal(dice), dice.between(0.01, 0.04)
-    return _rubber(dice), dice.between(0.05, 0.3)
+    return _rubber(dice), dice.between(0.05, 0.2)
 
 
 def _blocks(dice: Dice, law: Law, counts: tuple[int, int], high: float = 1.0) -> Blocks:
@@ -175,8 +175,10 @@ def _slider(dice: Dice) -> Corners:
     bed = Blocks((along, bed.lines[1] - bed.lines[1][-1]), bed.modulus, 0.3, soft)
     stiff = dice.one_of((2.0, 10.0)) * float(bed.modulus.max())
     upper = Blocks(upper.lines, np.full((1, 1), stiff), 0.3, hard)
-    depth, way = dice.between(0.02, 0.1), dice.between(0.0, 0.4)
-    pair = ContactPair(Surface("a", "y0"), Surface("b", "y1"), _friction(dice))
+    depth, way = dice.between(0.01, 0.05), dice.between(0.0, 0.3)
+    friction = dice.one_of((None, Coulomb(0.2)))
+    dice.say(f"friction {friction}")
+    pair = ContactPair(Surface("a", "y0"), Surface("b", "y1"), friction, discretisation="mortar")
     held = [Support("b", "y0"), Support("a", "y1", (way, -depth))]
     wanted = _some(
         dice, reaction_y={"surface": "a y1", "direction": (0, -1)}, contact_force={"direction": (0, 1)},
