@@ -64,13 +64,12 @@ def tangent_products(
 class _Errors:
     """Errors of two gradients at the Gauss points of cells, with the directions of changes of volume.
 
-    `errors`: shape (2, n_cells, n_gauss, m); `means`: of both gradients in cells, (2, n_cells, m);
-    `changes`: d, (2, n_cells, n_gauss); `direction`: N, zero where materials have no mean dilatation.
+    `errors`: shape (2, n_cells, n_gauss, m); `changes`: d, (2, n_cells, n_gauss); `direction`: N, that of the
+    stress of a change of volume, zero where materials have no mean dilatation.
     """
 
     known: TangentCells
     errors: np.ndarray
-    means: np.ndarray
     changes: np.ndarray
     direction: np.ndarray
 
@@ -100,16 +99,18 @@ class _Errors:
         size = np.linalg.norm(N[:, :components, :dim], axis=(1, 2))
         N /= np.where(size > 0.0, size, 1.0)[:, None, None]
         changes = np.einsum("nij,fnqij->fnq", N, np.array(centred))
-        means = np.einsum("nq,fnqm->fnm", weights, plane)
-        direction = N[:, :components, :dim].reshape(len(N), -1)
-        return cls(known, recovered - plane, means, changes, direction)
+        # The mean of a cell's directions is the one that its stresses have.
+        stressed = np.einsum("nab,nb->na", known.tangent.moduli, N[:, :components, :dim].reshape(len(N), -1))
+        size = np.linalg.norm(stressed, axis=1)
+        direction = stressed / np.where(size > 0.0, size, 1.0)[:, None]
+        return cls(known, recovered - plane, changes, direction)
 
     @property
     def stresses(self) -> np.ndarray:
         """Return S and T of the cells, shape (2, n_cells)."""
         tangent, N = self.known.tangent, self.direction
-        along = np.einsum("nm,nml,nl->n", N, tangent.moduli, self.means[1])
-        return np.array([np.einsum("nm,nm->n", tangent.stress.reshape(N.shape), N), along])
+        both = np.array([tangent.stress, tangent.change]).reshape(2, *N.shape)
+        return np.asarray(np.einsum("fnm,nm->fn", both, N))
 
     def products(self, volumetric: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return those of the first error, of the second one, and of both, by cell.

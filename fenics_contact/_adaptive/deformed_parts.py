@@ -52,9 +52,10 @@ class DeformedParts(StateParts):
         """Return those by the tangents at the state."""
         torn, known = self.state.torn, {}
         with together(comm_of(self.state)):
-            for part, step, u in self._each:
+            for (part, step, u), place in zip(self._each, torn.decomposition.parts, strict=True):
                 cells = self._cells(part, torn.scene.bodies[part.mesh.body])
-                known[part.mesh.number] = TangentCells(cells, cells.tangent(u, step))
+                w = values_of_dofs(part.mesh.space, part.mesh.on_space(adjoint[place]))
+                known[part.mesh.number] = TangentCells(cells, cells.tangent(u, w, step))
         return tangent_products(torn, known, self.state.conforming_displacement, adjoint)
 
     def change_of_work(self) -> Change:

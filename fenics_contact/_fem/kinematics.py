@@ -171,7 +171,7 @@ class GaussPoints:
 
     def gradient(self, displacement: np.ndarray) -> np.ndarray:
         """Return ∂u_i/∂X_j in three dimensions, zero out of the plane, shape (n_cells, n_gauss, 3, 3)."""
-        return self._gradients.of(displacement.reshape(self._shape[0], -1)[self._cells])
+        return self._gradients.of(displacement.reshape(self._shape)[self._cells])
 
     def interpolated(self, nodal: np.ndarray) -> np.ndarray:
         """Return a scalar field at the points, (n_cells, n_gauss), of its values by block, (n,)."""

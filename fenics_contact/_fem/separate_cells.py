@@ -34,11 +34,13 @@ class CellTangent:
 
     Attributes:
         stress: Nominal stress P, shape (n_cells, components, dim), [force / length²].
+        change: Of the stress along another displacement, to first order, shape as of ``stress``.
         moduli: ∂P_ij/∂∇u_kl, index dim i + j, shape (n_cells, components dim, components dim); at no
             change of strains that displacements have themselves.
     """
 
     stress: np.ndarray
+    change: np.ndarray
     moduli: np.ndarray
 
 
@@ -91,24 +93,27 @@ class SeparateCells:
         """
         return self._at_nodes(self._answer(displacement, step).force, displacement.shape[2])
 
-    def tangent(self, displacement: np.ndarray, step: MaterialStep) -> CellTangent:
+    def tangent(self, displacement: np.ndarray, along: np.ndarray, step: MaterialStep) -> CellTangent:
         """Return stresses and moduli for a displacement; arguments as of `forces`.
 
         They are what nodal forces and their growth do along displacements that are linear in each cell, and
         zero at its middle: the mean moduli of the cell, of which those with a mean dilatation are a part.
+        `along`: the other displacement, of the same shape.
         """
         count, width, components = displacement.shape
         away = self.points - self.points.mean(axis=1, keepdims=True)
         motions = np.einsum("ik,naj->naikj", np.eye(components), away).reshape(count, width * components, -1)
-        answer = self._answer(displacement, step)
-        forces = self._at_nodes(answer.force, components).reshape(count, -1)
-        columns = np.stack([self._by_dof(column) for column in np.moveaxis(motions, 2, 0)], axis=1)
-        growth = np.stack([self._at_nodes(each, components).reshape(count, -1)
-                           for each in (answer.stiffness @ columns).T], axis=2)  # fmt: skip
-        volume = self.weights.sum(axis=1)
-        stress = np.einsum("nam,na->nm", motions, forces) / volume[:, None]
-        moduli = np.matmul(motions.transpose(0, 2, 1), growth) / volume[:, None, None]
-        return CellTangent(stress.reshape(count, components, -1), moduli)
+        answer, volume = self._answer(displacement, step), self.weights.sum(axis=1)[:, None]
+
+        def stress(forces: np.ndarray) -> np.ndarray:
+            forces = self._at_nodes(forces, components).reshape(count, -1)
+            return np.asarray(np.einsum("nam,na->nm", motions, forces) / volume)
+
+        columns = [stress(answer.stiffness @ self._by_dof(each)) for each in np.moveaxis(motions, 2, 0)]
+        shape, change = (count, components, -1), stress(answer.stiffness @ self._by_dof(along))
+        return CellTangent(
+            stress(answer.force).reshape(shape), change.reshape(shape), np.stack(columns, axis=2)
+        )
 
     @property
     def weights(self) -> np.ndarray:

@@ -34,7 +34,7 @@ class Gradients:
         """Return ∂u_i/∂X_j of nodal u, zero out of the plane, shape (n_cells, n_gauss, 3, 3)."""
         dim = self.slopes.shape[-1]
         gradient = np.zeros((*self.slopes.shape[:2], 3, 3))
-        gradient[..., : nodal.shape[2], :dim] = nodal.swapaxes(1, 2)[:, None] @ self.slopes
+        gradient[..., :dim, :dim] = nodal.swapaxes(1, 2)[:, None] @ self.slopes
         return gradient
 
     def contracted(self, tensors: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     ContactProblem,
     Coulomb,
@@ -33,6 +34,7 @@ from fenics_contact.design.sensitivity import adjoint_of
 from fenics_contact.feti.averages import nodal_mean
 from fenics_contact.materials import (
     FinitePlasticity,
+    IsotropicElasticity,
     Material,
     NeoHooke,
     PlaneStrain,
@@ -76,6 +78,24 @@ def test_in_small_strain_it_is_that_of_the_linear_material(cell: str) -> None:
     assert linear.mesh > 0.05 * linear.value
     assert found.mesh == pytest.approx(linear.mesh, rel=1e-4)
     np.testing.assert_allclose(found.by_cell("beam"), linear.by_cell("beam"), rtol=1e-3)
+
+
+def test_around_an_axis_and_in_space_it_is_that_of_the_linear_material() -> None:
+    """Around an axis moduli hold for the mean radius of a cell."""
+    section = gallery.rectangle((1, 0), (2, 2), (4, 8))
+    cube = gallery.block((0, 0, 0), (2, 1, 1), (4, 2, 2))
+
+    def of(material: Material, mesh: BodyMesh) -> GoalError:
+        plane, last = mesh.dim == 2, "xyz"[mesh.dim - 1]
+        body = Body(mesh, material, axisymmetric=plane)
+        down = (*(0.0,) * (mesh.dim - 1), -1e-7)
+        ends = [Support("body", f"{last}0"), Support("body", f"{last}1", down)]
+        return estimated(Scene({"body": body}, ends), "reaction", surface=f"body {last}1", direction=down)
+
+    for mesh, off in ((section, 1e-2), (cube, 1e-4)):
+        linear, found = (of(law(1.0, 0.3), mesh) for law in (IsotropicElasticity, StVenantKirchhoff))
+        assert abs(linear.mesh) > 1e-3 * abs(linear.value)
+        assert found.mesh == pytest.approx(linear.mesh, rel=off)
 
 
 def test_curved_boundaries_add_what_they_do_in_small_strain() -> None:
@@ -151,3 +171,19 @@ def test_adjoints_of_moved_contact_are_those_of_difference_quotients(name: str) 
     work = np.linalg.norm(np.diff(mesh.points[ends], axis=1)[:, 0], axis=1) @ along[ends].mean(axis=1)
     assert abs(work) > 0.01
     assert work == pytest.approx((of(1e-5)[0] - of(-1e-5)[0]) / 2e-5, rel=1e-6)
+
+
+def test_changes_of_volume_around_an_axis_do_not_count_by_the_bulk_modulus() -> None:
+    """Strains around the axis are a part of these: without them it would be three times the force."""
+
+    def of(cells: int) -> GoalError:
+        section = gallery.rectangle((1, 0), (2, 2), (cells, 2 * cells))
+        ring = Body(section, NeoHooke(1.0, 0.4999, mean_dilatation=True), axisymmetric=True)
+        ends = [Support("ring", "y0"), Support("ring", "y1", (0.0, -0.02))]
+        return estimated(Scene({"ring": ring}, ends), "reaction", surface="ring y1", direction=(0, -1))
+
+    coarse, fine = of(3), of(9)
+    error = fine.value - coarse.value
+    assert abs(error) > 3e-3 * coarse.value
+    assert abs(coarse.total - error) < 0.03 * coarse.value
+    assert abs(fine.total) < 0.5 * abs(coarse.total)

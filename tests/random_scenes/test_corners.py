@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.materials import PlaneStrain
-from tools.random_scenes.corner_intervals import judge_corners
+from tools.random_scenes.corner_intervals import judge_corners, judge_nonlinear
 from tools.random_scenes.corners import Corners, corners, graded
 from tools.random_scenes.judge import GOOD, Outcome
 
@@ -49,3 +49,10 @@ def test_intervals_contain_what_graded_meshes_have() -> None:
     found = [judge_corners(seed) for seed in range(12, 18)]
     assert [verdict for verdict in found if verdict.outcome not in GOOD] == []
     assert sum(verdict.outcome is Outcome.SOLVED for verdict in found) >= 3
+
+
+@pytest.mark.claim
+def test_intervals_of_rubber_and_metal_contain_what_graded_meshes_have() -> None:
+    found = [judge_nonlinear(seed) for seed in (2, 8, 11, 12)]
+    assert [verdict.outcome for verdict in found] == [Outcome.SOLVED] * 4
+    assert max(verdict.share for verdict in found) < 1.0
