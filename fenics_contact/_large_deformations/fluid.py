@@ -57,7 +57,7 @@ class EnteredFluid(ContactFeedback):
     def of(cls, scene: Scene, contact: Contact, marks: np.ndarray) -> EnteredFluid:
         """Return it at nodes of bodies that move, shape (n_nodes,), none of (0,). Collective."""
         moving = cast(MovingContact, contact)
-        marks = np.resize(marks, len(scene.points)) if len(marks) else np.zeros(len(scene.points), dtype=bool)
+        marks = marks if len(marks) else np.zeros(len(scene.points), dtype=bool)
         front = moving.fluid_front(scene)
         return cls(front, moving, scene, marks, _pressing(scene, moving.decomposition, front, marks))
 

@@ -6,7 +6,12 @@ import numpy as np
 
 #: Columns of circles: squares of radii, centres, states whose points are on them, of which the last two are
 #: the same where there are two, and how much of the centre each of these points is.
-_SQUARE, _CENTRE, _SUPPORT, _SHARE = 0, slice(1, 3), slice(3, 6), slice(6, 9)
+
+
+class _Column:
+    """Columns of arrays of circles."""
+
+    square, centre, support, share = 0, slice(1, 3), slice(3, 6), slice(6, 9)
 
 
 def smallest_circles(paths: np.ndarray, rounding: float = 1e-12) -> tuple[np.ndarray, np.ndarray]:
@@ -24,18 +29,20 @@ def smallest_circles(paths: np.ndarray, rounding: float = 1e-12) -> tuple[np.nda
     support = np.stack([first, second, second])
     found, active = _through(points[support, every], support), every
     while active.size:
-        squares = ((points[:, active] - found[active, _CENTRE]) ** 2).sum(axis=2)
-        outside = squares.max(axis=0) > found[active, _SQUARE] * (1.0 + rounding) + least[active]
+        squares = ((points[:, active] - found[active, _Column.centre]) ** 2).sum(axis=2)
+        outside = squares.max(axis=0) > found[active, _Column.square] * (1.0 + rounding) + least[active]
         active, far = active[outside], squares.argmax(axis=0)[outside]
-        support = np.vstack([far, found[active, _SUPPORT].T.astype(int)])
+        support = np.vstack([far, found[active, _Column.support].T.astype(int)])
         larger = _around_four(points[support, active], support, 100.0 * rounding)
-        grown = larger[:, _SQUARE] > found[active, _SQUARE]  # rounding alone keeps the last circle
+        grown = (
+            larger[:, _Column.square] > found[active, _Column.square]
+        )  # rounding alone keeps the last circle
         active = active[grown]
         found[active] = larger[grown]
-    radius, slope = np.sqrt(found[:, _SQUARE]), np.zeros_like(points)
+    radius, slope = np.sqrt(found[:, _Column.square]), np.zeros_like(points)
     scale = np.where(radius > 0.0, radius, np.inf)[:, None]
-    for state, share in zip(found[:, _SUPPORT].T.astype(int), found[:, _SHARE].T, strict=True):
-        slope[state, every] += share[:, None] * (points[state, every] - found[:, _CENTRE]) / scale
+    for state, share in zip(found[:, _Column.support].T.astype(int), found[:, _Column.share].T, strict=True):
+        slope[state, every] += share[:, None] * (points[state, every] - found[:, _Column.centre]) / scale
     return radius, slope[..., :width]
 
 
@@ -62,8 +69,8 @@ def _around_four(points: np.ndarray, support: np.ndarray, rounding: float) -> np
     best = _through(points[[0, 0, 0]], support[[0, 0, 0]])
     for chosen in ([0, 1, 1], [0, 2, 2], [0, 3, 3], [0, 1, 2], [0, 1, 3], [0, 2, 3]):
         tried = _through(points[chosen], support[chosen])
-        most = ((points - tried[:, _CENTRE]) ** 2).sum(axis=2).max(axis=0)
-        smaller = (tried[:, _SQUARE] < best[:, _SQUARE]) | (best[:, _SQUARE] == 0.0)
-        better = (most <= tried[:, _SQUARE] * (1.0 + rounding)) & smaller
+        most = ((points - tried[:, _Column.centre]) ** 2).sum(axis=2).max(axis=0)
+        smaller = (tried[:, _Column.square] < best[:, _Column.square]) | (best[:, _Column.square] == 0.0)
+        better = (most <= tried[:, _Column.square] * (1.0 + rounding)) & smaller
         best = np.where(better[:, None], tried, best)
     return best

@@ -121,7 +121,7 @@ def test_every_table_builds_its_part() -> None:
             {**pair, "conductance": [{"law": name, **own} for name, own in laws.items()], "pressure": "y"},
             {"slave": {"body": "a", "surface": "y1"}, "master": floor, "conductance": 3.0, "temperature": 9},
         ],
-        "ties": [pair],
+        "ties": [{"slave": {"body": "b", "surface": "y0"}, "master": {"body": "a", "surface": "x1"}}],
     }
     mesh = {"shape": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0], "counts": [1, 1]}
     bodies = {
@@ -155,7 +155,7 @@ def test_every_table_builds_its_part() -> None:
     assert joint.law.at(touch) == pytest.approx(sum(law.at(touch) for law in expected))
     assert isinstance(below.master, RigidPlane)
     assert below.temperature == 9.0
-    assert scene.ties == (Tie(Surface("b", "x0"), Surface("a", "x1")),)
+    assert scene.ties == (Tie(Surface("b", "y0"), Surface("a", "x1")),)
 
 
 @pytest.mark.parametrize(

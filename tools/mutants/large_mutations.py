@@ -132,8 +132,8 @@ LARGE_MUTATIONS = (
     Mutation(
         "pressures of bodies that deform much are by undeformed area",
         "_pairing/sliding/means.py",
-        "np.where(self.much, self.now, self.before) * self.share",
-        "self.before * self.share",
+        "return self.pressed * self.share",
+        "return self.before * self.share",
         (
             "tests/large_deformations/test_true_pressure.py::test_an_incompressible_block_presses_with_its_stress",
         ),
