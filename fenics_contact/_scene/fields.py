@@ -123,6 +123,11 @@ def finite_numbers(value: Any) -> np.ndarray:
     return array if (np.abs(array) < LARGEST).all() else NOT_NUMBERS
 
 
+def is_number(value: Any) -> bool:
+    """Return whether a value is one finite number, no text and no truth value."""
+    return not isinstance(value, str | bool) and finite_numbers(value).shape == ()
+
+
 def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Evaluate a function of position.
 

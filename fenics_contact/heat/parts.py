@@ -12,7 +12,7 @@ import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.checks import check_known, check_not_negative, check_positive
-from fenics_contact._scene.fields import OfPosition, evaluate, finite_numbers
+from fenics_contact._scene.fields import OfPosition, evaluate, is_number
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.heat.exchange import Exchange, Place, given
 from fenics_contact.heat.properties import TemperatureTable, property_of, slope_of
@@ -25,7 +25,7 @@ Value: TypeAlias = float | OfPosition
 def _checked(name: str, given: Value) -> Value:
     if callable(given):
         return given
-    if isinstance(given, str | bool) or finite_numbers(given).shape != ():
+    if not is_number(given):
         raise InvalidInputError(
             f"{name} must be a finite number or a function of points, got {given!r}: give one number, or a "
             "function of points, shape (n, dim), that returns one for each"

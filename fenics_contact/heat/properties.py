@@ -13,7 +13,7 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._fem.load_forms import FIRST_COUNT
 from fenics_contact._scene.checks import check_positive
-from fenics_contact._scene.fields import Ufl, finite_numbers
+from fenics_contact._scene.fields import Ufl, finite_numbers, is_number
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 
@@ -291,7 +291,7 @@ def property_of(name: str, given: Any, remedy: str) -> Property:
         return ByUfl(name, given)
     if callable(given):
         return ByFunction(name, given)
-    if isinstance(given, str | bool) or finite_numbers(given).shape != ():
+    if not is_number(given):
         raise InvalidInputError(
             f"{name} must be a number, a TemperatureTable, a function of temperatures or Ufl, got {given!r}: "
             f"{remedy}"
