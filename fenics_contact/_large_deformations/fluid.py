@@ -201,12 +201,12 @@ def _pressing(
     found = {}
     for fluid, name in enumerate(front.names):
         split, loads, bodies = np.zeros(len(marks), dtype=bool), [], dict(scene.bodies)
-        for body, facets in _wettable(scene, np.flatnonzero(front.fluids == fluid)).items():
+        pairs, known = np.flatnonzero(front.fluids == fluid), front.nodes.slave[front.nodes.pair == fluid]
+        for body, facets in _wettable(scene, pairs).items():
             mesh, first = scene.bodies[body].mesh, decomposition.tearing.first_of(body)
             wet = marks[first : first + mesh.n_nodes].astype(float)
             # Fluid reaches nodes that are held where it is next to them.
-            held = ~np.isin(first + facets, front.nodes.slave[front.nodes.pair == fluid])
-            held &= np.isin(facets, _slave_nodes(scene, body, np.flatnonzero(front.fluids == fluid)))
+            held = ~np.isin(first + facets, known) & np.isin(facets, _slave_nodes(scene, body, pairs))
             beside = np.broadcast_to(wet[facets].max(axis=1)[:, None], facets.shape)
             np.maximum.at(wet, facets[held], beside[held])
             split[first + np.unique(facets[np.ptp(wet[facets], axis=1) > 0.0])] = True

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Columns of circles: squares of radii, centres, states whose points are on them, of which the last two are
-#: the same where there are two, and how much of the centre each of these points is.
-
 
 class _Column:
-    """Columns of arrays of circles."""
+    """Columns of arrays of circles: squares of radii, centres, states whose points are on them, and shares.
+
+    Of these states the last two are the same where there are two; a share is how much of the centre a point
+    is.
+    """
 
     square, centre, support, share = 0, slice(1, 3), slice(3, 6), slice(6, 9)
 
@@ -34,9 +35,8 @@ def smallest_circles(paths: np.ndarray, rounding: float = 1e-12) -> tuple[np.nda
         active, far = active[outside], squares.argmax(axis=0)[outside]
         support = np.vstack([far, found[active, _Column.support].T.astype(int)])
         larger = _around_four(points[support, active], support, 100.0 * rounding)
-        grown = (
-            larger[:, _Column.square] > found[active, _Column.square]
-        )  # rounding alone keeps the last circle
+        # Rounding alone keeps the last circle.
+        grown = larger[:, _Column.square] > found[active, _Column.square]
         active = active[grown]
         found[active] = larger[grown]
     radius, slope = np.sqrt(found[:, _Column.square]), np.zeros_like(points)
