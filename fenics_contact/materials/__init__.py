@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         OrthotropicPlaneStress,
         material_axes,
     )
+    from fenics_contact.materials.plane_stress import HistoryPlaneStress, HyperelasticPlaneStress
     from fenics_contact.materials.plastic import (
         FinitePlasticity,
         HistoryMaterial,
@@ -49,6 +50,8 @@ __all__ = [
     "EnergyModel",
     "FinitePlasticity",
     "HistoryMaterial",
+    "HistoryPlaneStress",
+    "HyperelasticPlaneStress",
     "Hyperelasticity",
     "Hyperfoam",
     "IsotropicElasticity",

@@ -18,6 +18,7 @@ from fenics_contact.materials.hyperelastic import (
     check_moduli,
     deformation_gradient,
     gradient_in_space,
+    gradient_of_sheet,
     isochoric_invariants,
     power_sum,
 )
@@ -91,6 +92,17 @@ class Hyperfoam(Hyperelasticity):
             shape = J ** (alpha / 3) * power_sum(first, second, alpha / 2) - 3
             energy += 2 * mu / alpha**2 * (shape + volume)
         return energy
+
+    def stress_across(
+        self, F: Expr, stretch: Expr, parameters: tuple[ufl.Constant, ...]
+    ) -> tuple[Expr, Expr]:
+        """Return Σ 2 μ_p/α_p (λ^α_p − J^(−α_p β_p)), and its derivative by ln λ."""
+        J = ufl.det(gradient_of_sheet(F, stretch))
+        stress, slope = 0, 0
+        for mu, alpha, beta in zip(parameters, self.exponents, self._betas, strict=False):
+            stress += 2 * mu / alpha * (stretch**alpha - J ** (-alpha * beta))
+            slope += 2 * mu * (stretch**alpha + beta * J ** (-alpha * beta))
+        return stress, slope
 
     def first_piola(self, F: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the first Piola-Kirchhoff stress ∂W/∂F (as large as F, UFL), [force / length²]."""

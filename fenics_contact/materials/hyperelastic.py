@@ -182,6 +182,33 @@ class Hyperelasticity(Expanding):
         """Return the same normal to the plane."""
         return parameters[-1] * sum(self._moduli(3, parameters)[2, 2, k, k] for k in range(3))
 
+    def stress_across(
+        self, F: Expr, stretch: Expr, parameters: tuple[ufl.Constant, ...]
+    ) -> tuple[Expr, Expr]:
+        """Return Kirchhoff's stress λ ∂W/∂λ normal to a plane, and its derivative by ln λ (UFL scalars).
+
+        `F`: deformation gradient in the plane; `stretch`: λ normal to it.
+        """
+        across = ufl.variable(stretch)
+        stress = across * ufl.diff(self.energy(gradient_of_sheet(F, across), parameters), across)
+        return stress, across * ufl.diff(stress, across)
+
+    def stretch_across(self, F: Expr, parameters: tuple[ufl.Constant, ...], steps: int = 8) -> Expr:
+        """Return the stretch λ normal to a plane without stress across it (UFL scalar), by F in the plane.
+
+        Override it where there is a formula. Newton's method for ln λ starts from what is right for small
+        strains and without change of volume. Where `steps` of them do not end there is no stretch (NaN).
+        """
+        moduli = self._moduli(3, parameters)
+        poisson = (moduli[2, 2, 0, 0] + moduli[2, 2, 1, 1]) / (2 * moduli[2, 2, 2, 2])
+        stretch = ufl.det(gradient_of_sheet(F, 1)) ** (-poisson)
+        for _ in range(steps):
+            stress, slope = self.stress_across(F, stretch, parameters)
+            stretch *= ufl.exp(-stress / slope)
+        stress, slope = self.stress_across(F, stretch, parameters)
+        nowhere = ufl.sqrt(-1 - stretch**2)
+        return ufl.conditional(ufl.le(abs(stress), 1e-10 * slope), stretch, nowhere)
+
     def _moduli(self, dim: int, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return ∂²W/∂F² at F = I."""
         # The variable keeps UFL from simplifying the identity away before it has differentiated.
@@ -198,7 +225,12 @@ def gradient_in_space(F: Expr) -> Expr:
     """Return a deformation gradient as 3 x 3 tensor; one in the plane is that of plane strain."""
     if F.ufl_shape == (3, 3):
         return F
-    return ufl.as_tensor([[F[0, 0], F[0, 1], 0], [F[1, 0], F[1, 1], 0], [0, 0, 1]])
+    return gradient_of_sheet(F, 1)
+
+
+def gradient_of_sheet(F: Expr, stretch: Expr | int) -> Expr:
+    """Return a deformation gradient (3 x 3) by its part in the plane and the stretch normal to it."""
+    return ufl.as_tensor([[F[0, 0], F[0, 1], 0], [F[1, 0], F[1, 1], 0], [0, 0, stretch]])
 
 
 def is_nonlinear(material: object) -> bool:
@@ -520,6 +552,20 @@ class Ogden(IsotropicRubber):
         """Return K/2 (J − 1)²."""
         return parameters[len(self.exponents)] / 2 * (J - 1) ** 2
 
+    def stress_across(
+        self, F: Expr, stretch: Expr, parameters: tuple[ufl.Constant, ...]
+    ) -> tuple[Expr, Expr]:
+        """Return Σ μ_p (λ̄^α_p − ⅓ Σ λ̄_i^α_p) + K J (J − 1), and its derivative by ln λ."""
+        whole = gradient_of_sheet(F, stretch)
+        (first, second), J = isochoric_invariants(whole), ufl.det(whole)
+        bulk = parameters[len(self.exponents)]
+        stress, slope = bulk * J * (J - 1), bulk * J * (2 * J - 1)
+        for shear, alpha in zip(parameters, self.exponents, strict=False):
+            own, total = (stretch * J ** (-1 / 3)) ** alpha, power_sum(first, second, alpha / 2)
+            stress += shear * (own - total / 3)
+            slope += shear * alpha * (own + total / 3) / 3
+        return stress, slope
+
 
 def check_exponents(exponents: Sequence[float]) -> None:
     """Reject terms of an energy without influence."""
@@ -567,3 +613,9 @@ class StVenantKirchhoff(Hyperelasticity):
         lame_parameter, shear = parameters[:2]
         E = (F.T * F - ufl.Identity(3)) / 2
         return lame_parameter / 2 * ufl.tr(E) ** 2 + shear * ufl.inner(E, E)
+
+    def stretch_across(self, F: Expr, parameters: tuple[ufl.Constant, ...], steps: int = 0) -> Expr:
+        """Return √(1 − λ/(λ + 2μ) (tr FᵀF − 2)) of F in the plane; none is left where that is not real."""
+        lame_parameter, shear = parameters[:2]
+        squares = sum(F[i, j] ** 2 for i in range(2) for j in range(2))
+        return ufl.sqrt(1 - lame_parameter / (lame_parameter + 2 * shear) * (squares - 2))

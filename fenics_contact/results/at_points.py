@@ -24,6 +24,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlinear
+from fenics_contact.materials.plane_stress import HistoryPlaneStress, HyperelasticPlaneStress
 from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CellType, quadrature, shape_gradients, shape_values
@@ -109,7 +110,7 @@ class PointFields(AtPoints):
         stress: Shape (n_cells, n_points, 3, 3), [force / length²], Cauchy's where bodies deform much.
         strain: Shape (n_cells, n_points, 3, 3): ½ (∇u + ∇uᵀ), where bodies deform much ½ (FᵀF − 1). Normal to
             plane bodies it is zero, in plane stress with isotropic materials −ν/E (σ₁₁ + σ₂₂), without what
-            heat adds.
+            heat adds, and with nonlinear ones not a number.
         plastic_strain: Shape (n_cells, n_points): the accumulated equivalent plastic strain, zero in
             materials without one.
     """
@@ -198,7 +199,10 @@ class QuadraturePoints:
         for number, material in enumerate(body.materials):
             mine = body.material_of_cells == number
             young, poisson = isotropic_constants(material) or (np.inf, 0.0)
-            if body.mesh.dim == 2 and not strain[mine][..., 2, 2].any() and not stress[mine][..., 2, 2].any():
+            across = strain[mine][..., 2, 2].any() or stress[mine][..., 2, 2].any()
+            if isinstance(material, HyperelasticPlaneStress | HistoryPlaneStress):
+                strain[mine, :, 2, 2] = np.nan
+            elif body.mesh.dim == 2 and not across:
                 strain[mine, :, 2, 2] = -poisson / young * (stress[mine, :, 0, 0] + stress[mine, :, 1, 1])
         return strain
 
