@@ -32,11 +32,20 @@ def rounded_punch(size: float) -> BodyMesh:
 
 
 def half_ring(inner: float, outer: float, counts: tuple[int, int], grading: float = 0.0) -> BodyMesh:
-    """Mesh the right half of a ring around the origin: surfaces inner, outer, and on the cut below and above.
+    """Mesh the right half of a ring around the origin, see `ring_part`."""
+    return ring_part((inner, outer), (-np.pi / 2, np.pi / 2), counts, grading)
 
-    `counts`: cells along the radius, and around; `grading`: as of `rectangle`, along the radius.
+
+def ring_part(
+    radii: tuple[float, float], angles: tuple[float, float], counts: tuple[int, int], grading: float = 0.0
+) -> BodyMesh:
+    """Mesh a part of a ring around the origin: surfaces inner, outer, and on the cuts below and above.
+
+    `angles`: from the first axis; `counts`: cells along the radius, and around; `grading`: as of `rectangle`,
+    along the radius.
     """
-    flat = gallery.rectangle((inner, -np.pi / 2), (outer, np.pi / 2), counts, grading=(grading, 0.0))
+    (inner, outer), (first, last) = radii, angles
+    flat = gallery.rectangle((inner, first), (outer, last), counts, grading=(grading, 0.0))
     radius, angle = flat.points.T
     points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
     points[np.isclose(np.abs(angle), np.pi / 2), 0] = 0.0

@@ -11,7 +11,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 from mpi4py import MPI
 
-from benchmarks.others import large, linear, warm
+from benchmarks.others import large, linear, ring, warm
 from benchmarks.others.rows import Problem, Row
 from benchmarks.study import ROOT, Records, Study, filled, found, unfilled
 from fenics_contact.output import write_json, write_text
@@ -25,6 +25,7 @@ PROBLEMS = {
     "flat punch": Problem("Flat punch on a slab, solids4foam", linear.flat_punch_rows),
     "tube": Problem("Tube that closes a gap, SSNA105", linear.tube_rows),
     "rubber": Problem("Rubber cylinder between plates, Sussman and Bathe", large.rubber_rows),
+    "ring": Problem("Ring between plates, SSNP501 and SSNP502", ring.ring_rows),
     "joint": Problem("Heat through a pressed joint, MOOSE", warm.joint_rows),
     "annulus": Problem("Heat across an annular gap, MOOSE", warm.annulus_rows),
     "gap": Problem("Gap conductance, Abaqus", warm.obstacle_rows),

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.others import large, linear, warm
+from benchmarks.others import large, linear, ring, warm
 from benchmarks.others.report import PROBLEMS, QUICK, check, row_of, tables
 from benchmarks.others.rows import Row
 from benchmarks.study import filled
@@ -22,6 +22,7 @@ EXPLAINED = (
     "u_z of the foundation on the axis, μ 0 [mm]",
     "u_z of the foundation on the axis, μ 0.1 [mm]",
     "way of the punch under 10 kN/mm [mm]",
+    *(f"force on half a plate, μ {mu}, {k}/4 of the way [N/cm]" for mu in ("0", "0.4") for k in (1, 2, 3, 4)),
 )
 
 
@@ -53,6 +54,14 @@ def test_the_peak_at_the_rounded_edge_has_a_small_bar_and_takes_few_products(rec
     assert peaks[0].value == pytest.approx(910.4, rel=2e-3)  # graded quadratic meshes
 
 
+@pytest.mark.slow
+def test_code_asters_force_on_the_plate_has_a_support_in_it() -> None:
+    """Nine digits of two sums and two displacements, with friction, which it prints."""
+    row = ring.printed_row(0.4)
+    assert row.value == pytest.approx(33.4798287993, rel=1e-9)
+    assert row.levels[0][0] == pytest.approx(22.865, abs=1e-3)
+
+
 @pytest.mark.parametrize("name", QUICK)
 def test_a_cheap_problem_is_what_the_record_says(record: dict[str, Any], name: str) -> None:
     found = PROBLEMS[name].rows()
@@ -74,6 +83,7 @@ def test_a_reference_outside_of_the_bar_is_found() -> None:
     [
         lambda: linear.roller(0.1), lambda: linear.punch(0.1), linear.pin, linear.flat_punch,
         lambda: linear.tube(1e-3), lambda: large.rubber_cylinder(4),
+        lambda: ring.ring(ring.quarter((2, 8)), 0.4),
     ],
 )  # fmt: skip
 def test_each_scene_has_a_plan(scene: Callable[[], Scene]) -> None:
@@ -84,7 +94,7 @@ def test_each_scene_has_a_plan(scene: Callable[[], Scene]) -> None:
 
 
 @pytest.mark.claim
-@pytest.mark.parametrize("name", ["pin", "roller", "flat punch", "rubber"])
+@pytest.mark.parametrize("name", ["pin", "roller", "flat punch", "rubber", "ring"])
 def test_a_problem_is_what_the_record_says(record: dict[str, Any], name: str) -> None:
     for row, stored in zip(PROBLEMS[name].rows(), map(row_of, record[name]), strict=True):
         assert row.value == pytest.approx(stored.value, abs=row.error + stored.error)
