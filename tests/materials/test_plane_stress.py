@@ -14,7 +14,16 @@ import ufl
 from mpi4py import MPI
 from scipy.optimize import brentq
 
-from fenics_contact import Body, Scene, Support, ThermalStrain, check_hyperelastic, solve_scene
+from fenics_contact import (
+    Body,
+    Scene,
+    Support,
+    ThermalStrain,
+    check_hyperelastic,
+    quantity,
+    solve_scene,
+    solve_to,
+)
 from fenics_contact.design import Movement
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
@@ -36,6 +45,7 @@ from tests.design import deformed_blocks
 from tests.design.test_deformed_sensitivity import PRESSURES, miss
 from tests.materials.deformed import derivative_errors, patch_of, rotation, skew_patch, smooth_field
 from tests.materials.elements import whole
+from tests.materials.sheets_on_ranks import disc_on_block
 from tests.materials.test_hyperelasticity import MODELS, Energy, stress
 
 
@@ -229,6 +239,15 @@ def test_two_sheets_press_each_other_alike_on_one_rank_and_on_two() -> None:
     for name, values in alone.items():
         size = np.abs(values).max()
         np.testing.assert_allclose(found(2)[name], values, atol=1e-8 * size)
+
+
+@pytest.mark.slow
+def test_solve_to_knows_the_force_between_sheets() -> None:
+    """Against three meshes, each of half the size, the last of 32 cells from the pole."""
+    scene = disc_on_block(4)
+    force = quantity("contact_force", scene, direction=(0, 1))
+    near = solve_to(scene, force, 0.01, MPI.COMM_SELF)
+    assert abs(near.value - 0.094938) <= near.error < 0.01 * near.value
 
 
 # Metals in small strain.
