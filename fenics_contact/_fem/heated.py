@@ -1,7 +1,7 @@
 """Bodies that expand by heat under large deformations: materials feel F / θ with a thermal stretch θ.
 
 Of a displacement u they get a stand-in whose gradient is (I + ∇u) / θ − I, in space also in the plane, of
-test functions one whose gradient is ∇v / θ; see `_kinematics.stand_ins`. An energy θ³ W(F / θ) then has
+test functions one whose gradient is ∇v / θ; see `materials.stand_ins`. An energy θ³ W(F / θ) then has
 the work θ³ ∂W : δF / θ.
 """
 
@@ -18,7 +18,7 @@ from fenics_contact.materials.plastic import has_history
 
 if TYPE_CHECKING:
     from fenics_contact._kinematics.element import Element
-    from fenics_contact._kinematics.stand_ins import LiftedCoefficient
+    from fenics_contact.materials.stand_ins import LiftedCoefficient
 
 
 def heat_expands(material: Any) -> bool:
@@ -28,7 +28,7 @@ def heat_expands(material: Any) -> bool:
 
 def thermal_split(stretch: Expr, displacement: Expr, *others: Expr) -> tuple[LiftedCoefficient, ...]:
     """Return stand-ins for a displacement and for other fields, test functions among them."""
-    from fenics_contact._kinematics.stand_ins import stand_in  # others go without
+    from fenics_contact.materials.stand_ins import stand_in  # others go without
 
     gradient = (ufl.Identity(3) + _in_space(displacement)) / stretch - ufl.Identity(3)
     gradients = [gradient, *(_in_space(each) / stretch for each in others)]
@@ -38,7 +38,7 @@ def thermal_split(stretch: Expr, displacement: Expr, *others: Expr) -> tuple[Lif
 
 def on_stretched(density: Expr, element: Element) -> Expr:
     """Return what a material made of stand-ins, in displacements on the cells."""
-    from fenics_contact._kinematics.stand_ins import replaced
+    from fenics_contact.materials.stand_ins import replaced
 
     return replaced(density, element.x)
 

@@ -164,7 +164,7 @@ class Revolution(Kinematics):
         """Return a displacement in space for each."""
         import ufl  # plane and solid bodies go without
 
-        from fenics_contact._kinematics.stand_ins import stand_in
+        from fenics_contact.materials.stand_ins import stand_in
 
         return tuple(
             stand_in(
@@ -179,7 +179,7 @@ class Revolution(Kinematics):
         """Return an energy density of a gradient; u_r / r and u_θ / r are as accurate, and left out."""
         import ufl
 
-        from fenics_contact._kinematics.stand_ins import stand_in
+        from fenics_contact.materials.stand_ins import stand_in
 
         strained = stand_in(0, ufl.as_vector([0, 0, 0]), self._gradient_in_space(gradient, 0.0, 0))
         return self.on_cells(energy(strained), x)
@@ -198,7 +198,7 @@ class Revolution(Kinematics):
 
     def on_cells(self, density: Any, x: Any) -> Any:
         """Return what a material made of displacements in space."""
-        from fenics_contact._kinematics.stand_ins import replaced
+        from fenics_contact.materials.stand_ins import replaced
 
         return replaced(density, x)
 

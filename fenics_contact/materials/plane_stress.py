@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import ufl
@@ -12,6 +13,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact._base.checks import checked
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.elastic import Expanding
 from fenics_contact.materials.hyperelastic import (
     Hyperelasticity,
     deformation_gradient,
@@ -23,13 +25,50 @@ from fenics_contact.materials.plastic import HistoryMaterial, MaterialResponse
 Parameters = tuple[ufl.Constant, ...]
 
 
+class Sheet(Expanding):
+    """A thin plane body of a material of bodies in space, without stress normal to it."""
+
+    material: Any
+    is_sheet: ClassVar[bool] = True
+
+    @property
+    def dims(self) -> tuple[int, ...]:
+        """Plane bodies."""
+        return (2,)
+
+    @property
+    def thermal_expansion(self) -> float | None:  # type: ignore[override]
+        """That of the material."""
+        expansion: float | None = self.material.thermal_expansion
+        return expansion
+
+    def _check(self) -> None:
+        """Reject plane materials, and mean dilatations, which would couple the points of a cell."""
+        name = type(self.material).__name__
+        if 3 not in self.material.dims:
+            raise InvalidInputError(
+                f"a sheet needs a material of bodies in space, got {name}: give its material"
+            )
+        if has_mean_dilatation(self.material):
+            raise InvalidInputError(
+                f"sheets find what is normal to them at each point, got {name} with mean_dilatation=True: "
+                "leave it out, sheets do not lock"
+            )
+
+
+def is_sheet(material: object) -> bool:
+    """Return whether a material finds by itself what bodies do normal to their plane."""
+    return bool(getattr(material, "is_sheet", False))
+
+
 @dataclass(frozen=True)
 @checked()
-class HyperelasticPlaneStress(Hyperelasticity):
+class HyperelasticPlaneStress(Sheet, Hyperelasticity):
     """A thin sheet of a hyperelastic material, without stress normal to it, under large deformations.
 
-    The stretch λ normal to the sheet is found at each point so that ∂W/∂λ = 0. Forces are per unit of the
-    undeformed thickness. Where there is no such λ there is no stress (NaN), and load steps are cut.
+    The stretch λ normal to the sheet is found at each point so that ∂W/∂λ = 0. Forces are per unit of
+    length normal to the undeformed sheet. Where there is no such λ there is no stress (NaN), and load steps
+    are cut.
 
     Attributes:
         material: The material, of bodies in space; its energy must not change where the sheet is mirrored at
@@ -45,19 +84,13 @@ class HyperelasticPlaneStress(Hyperelasticity):
 
     def __post_init__(self) -> None:
         """Reject materials of other bodies, and those that a stretch in the plane would shear across it."""
-        name = type(self.material).__name__
-        if not isinstance(self.material, Hyperelasticity) or 3 not in self.material.dims:
-            raise InvalidInputError(
-                f"HyperelasticPlaneStress needs a hyperelastic material of bodies in space, got {name}: take "
-                "one such as NeoHooke, else PlaneStress or HistoryPlaneStress"
-            )
-        _check_no_means(self.material)
-        for i in range(2):
-            one, other = (self._sheared(i, size) for size in (0.1, -0.1))
+        self._check()
+        for axis in range(2):
+            one, other = (self._sheared(axis, size) for size in (0.1, -0.1))
             if not abs(one - other) <= 1e-9 * abs(one + other):
                 raise InvalidInputError(
-                    f"a sheet of {name} must not be sheared across its plane as it is stretched, but its "
-                    "energy differs by the sign of that shear: turn its axes into the plane"
+                    f"a stretched sheet of {type(self.material).__name__} must not shear across its plane, but "
+                    "its energy differs by the sign of that shear: turn its axes into the plane"
                 )
 
     def _sheared(self, axis: int, size: float) -> float:
@@ -67,16 +100,6 @@ class HyperelasticPlaneStress(Hyperelasticity):
         return float(
             expand_derivatives(ufl.as_ufl(self.material.energy(ufl.as_matrix(F), self.parameters)))(())
         )
-
-    @property
-    def dims(self) -> tuple[int, ...]:
-        """Plane bodies."""
-        return (2,)
-
-    @property
-    def thermal_expansion(self) -> float | None:  # type: ignore[override]
-        """That of the material."""
-        return self.material.thermal_expansion
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -128,7 +151,7 @@ class HyperelasticPlaneStress(Hyperelasticity):
 
         The stress τ(F, λ) normal to the sheet stays zero along each: ∂τ/∂F : ∇v + ∂τ/∂λ δλ = 0.
         """
-        from fenics_contact._kinematics.stand_ins import replaced, stand_in  # others go without
+        from fenics_contact.materials.stand_ins import replaced, stand_in  # others go without
 
         F = deformation_gradient(u)
         at, stretch = ufl.variable(F), self.material.stretch_across(F, parameters)
@@ -145,12 +168,12 @@ class HyperelasticPlaneStress(Hyperelasticity):
 
 @dataclass(frozen=True)
 @checked()
-class HistoryPlaneStress(HistoryMaterial):
+class HistoryPlaneStress(Sheet, HistoryMaterial):
     """A thin sheet of a metal in small strain, without stress normal to it.
 
     The strain normal to the sheet is found at each point by Newton's method, safeguarded by bisection, with
     the consistent tangent. Internal variables: those of the material, and that strain. Forces are per unit
-    of thickness.
+    of length normal to it.
 
     Attributes:
         material: The material, such as `J2Plasticity`, of small strain and without `mean_dilatation`.
@@ -165,22 +188,12 @@ class HistoryPlaneStress(HistoryMaterial):
 
     def __post_init__(self) -> None:
         """Reject materials of other bodies and of large deformations."""
-        name = type(self.material).__name__
-        if (
-            not isinstance(self.material, HistoryMaterial)
-            or 3 not in self.material.dims
-            or self.material.finite
-        ):
+        self._check()
+        if self.material.finite:
             raise InvalidInputError(
-                f"HistoryPlaneStress needs a material with a history in small strain, got {name}: take one "
-                "such as J2Plasticity, else PlaneStress or HyperelasticPlaneStress"
+                f"HistoryPlaneStress needs a material of small strain, got {type(self.material).__name__}: "
+                "take one such as J2Plasticity, or a body in space"
             )
-        _check_no_means(self.material)
-
-    @property
-    def dims(self) -> tuple[int, ...]:
-        """Plane bodies."""
-        return (2,)
 
     @property
     def symmetric(self) -> bool:  # type: ignore[override]
@@ -191,11 +204,6 @@ class HistoryPlaneStress(HistoryMaterial):
     def expands(self) -> bool:
         """Whether the material does."""
         return self.material.expands
-
-    @property
-    def thermal_expansion(self) -> float | None:  # type: ignore[override]
-        """That of the material."""
-        return self.material.thermal_expansion
 
     @property
     def history_size(self) -> int:
@@ -269,12 +277,3 @@ def _in_plane(end: MaterialResponse) -> tuple[np.ndarray, np.ndarray]:
     )
     tangent[:, :2, :2, :2, :2] = free[:, :2, :2, :2, :2]
     return stress, tangent
-
-
-def _check_no_means(material: Hyperelasticity | HistoryMaterial) -> None:
-    """Reject mean dilatations, which would couple the points of a cell."""
-    if has_mean_dilatation(material):
-        raise InvalidInputError(
-            f"sheets in plane stress find their stretch at each point, got {type(material).__name__} with "
-            "mean_dilatation=True: leave it out, sheets do not lock"
-        )

@@ -24,7 +24,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.elastic import isotropic_constants
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlinear
-from fenics_contact.materials.plane_stress import HistoryPlaneStress, HyperelasticPlaneStress
+from fenics_contact.materials.plane_stress import is_sheet
 from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CellType, quadrature, shape_gradients, shape_values
@@ -200,7 +200,7 @@ class QuadraturePoints:
             mine = body.material_of_cells == number
             young, poisson = isotropic_constants(material) or (np.inf, 0.0)
             across = strain[mine][..., 2, 2].any() or stress[mine][..., 2, 2].any()
-            if isinstance(material, HyperelasticPlaneStress | HistoryPlaneStress):
+            if is_sheet(material):
                 strain[mine, :, 2, 2] = np.nan
             elif body.mesh.dim == 2 and not across:
                 strain[mine, :, 2, 2] = -poisson / young * (stress[mine, :, 0, 0] + stress[mine, :, 1, 1])

@@ -15,17 +15,26 @@ from fenics_contact import (
     RigidPlane,
     RigidSphere,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
     SurfaceDesign,
     box_partition,
 )
-from fenics_contact.design import Objective
+from fenics_contact.design import (
+    ContactArea,
+    LargestPressure,
+    Objective,
+    PressureNonuniformity,
+    PressureNorm,
+)
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import NeoHooke
 from tests.design.quotients import Remembering
 from tests.scenes import RigidObstacle
 
+#: True pressures and areas, in every way that an objective has them.
+PRESSURES = PressureNorm() + 0.3 * LargestPressure() + 0.2 * ContactArea() + 0.5 * PressureNonuniformity()
 RUBBER, HARDER = NeoHooke(1.0, 0.3), NeoHooke(2.0, 0.3)
 
 
@@ -79,3 +88,21 @@ def design_problem(
     pieces = {name: box_partition(body.mesh, (2,) * scene.dim) for name, body in scene.bodies.items()}
     contact = ContactProblem(scene, comm, partitions=pieces, tolerance=tolerance, steps=steps)
     return Remembering(contact, designs or SurfaceDesign("block", low, net=net), objective)
+
+
+STEP = 3e-5
+
+
+def line(problem: ShapeProblem) -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(1)
+    return 0.01 * random.standard_normal(problem.size), random.uniform(-1.0, 1.0, problem.size)
+
+
+def miss(problem: ShapeProblem, exact: ShapeProblem, objective: Objective | None = None) -> float:
+    """Relative difference of the derivative by the adjoint from the difference quotient."""
+    if objective is not None:
+        problem.objective = exact.objective = objective
+    alpha, along = line(problem)
+    by_adjoint = problem.evaluate(alpha).gradient @ along
+    quotient = (exact.value_of(alpha + STEP * along) - exact.value_of(alpha - STEP * along)) / (2 * STEP)
+    return float(abs(by_adjoint - quotient) / abs(quotient))

@@ -27,12 +27,9 @@ from fenics_contact import (
 )
 from fenics_contact._pairing.sliding import points as sliding_points
 from fenics_contact.design import (
-    ContactArea,
     LargestPressure,
     LoadPath,
     Movement,
-    Objective,
-    PressureNonuniformity,
     PressureNorm,
     StrainEnergy,
 )
@@ -41,29 +38,11 @@ from fenics_contact.design import (
 )
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials import Material, PlaneStrain
-from tests.design.deformed_blocks import HARDER, design_problem, pressed
+from tests.design.deformed_blocks import HARDER, PRESSURES, design_problem, miss, pressed
 
 Patch = pytest.MonkeyPatch
 LeaveOut = Callable[[Patch], None]
-#: True pressures and areas, in every way that an objective has them.
-PRESSURES = PressureNorm() + 0.3 * LargestPressure() + 0.2 * ContactArea() + 0.5 * PressureNonuniformity()
 slowly = partial(pytest.param, marks=[pytest.mark.slow, pytest.mark.claim])
-STEP = 3e-5
-
-
-def line(problem: ShapeProblem) -> tuple[np.ndarray, np.ndarray]:
-    random = np.random.default_rng(1)
-    return 0.01 * random.standard_normal(problem.size), random.uniform(-1.0, 1.0, problem.size)
-
-
-def miss(problem: ShapeProblem, exact: ShapeProblem, objective: Objective | None = None) -> float:
-    """Relative difference of the derivative by the adjoint from the difference quotient."""
-    if objective is not None:
-        problem.objective = exact.objective = objective
-    alpha, along = line(problem)
-    by_adjoint = problem.evaluate(alpha).gradient @ along
-    quotient = (exact.value_of(alpha + STEP * along) - exact.value_of(alpha - STEP * along)) / (2 * STEP)
-    return float(abs(by_adjoint - quotient) / abs(quotient))
 
 
 @cache

@@ -161,6 +161,8 @@ from fenics_contact.heat.interaction import Interaction
 from fenics_contact.materials import (
     AnisotropicElasticity,
     FinitePlasticity,
+    HistoryPlaneStress,
+    HyperelasticPlaneStress,
     Hyperfoam,
     J2Plasticity,
     MooneyRivlin,
@@ -261,6 +263,7 @@ def objects() -> dict[str, Any]:
         Pressure("block", "z1", 1.0), Tresca(1.0), Tie(Surface("a", "z0"), Surface("b", "z1")),
         MooneyRivlin(1.0, 0.0, 9.0), Ogden((1.0,), (2.0,), 9.0), StVenantKirchhoff(1.0, 0.3),
         PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3), NeoHooke(1.0, 0.3), J2Plasticity(1.0, 0.3, 1.0),
+        HyperelasticPlaneStress(NeoHooke(1.0, 0.3)), HistoryPlaneStress(J2Plasticity(1.0, 0.3, 1.0)),
         FinitePlasticity(1.0, 0.3, 1.0), NeoHookeanPlasticity(1.0, 0.3, 1.0),
         Hyperfoam((1.0,), (2.0,), (0.1,)), RambergOsgood(1.0, 0.3, 1.0, 5.0, 0.4),
         J2Plasticity(1.0, 0.3, 1.0).answer(np.zeros((9, 3, 3)), np.zeros((9, 7)), 0.0), Ufl(lambda x: x[0]),

@@ -16,7 +16,6 @@ from fenics_contact._fem.mechanics import MaterialStep
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
-    Hyperelasticity,
     IsotropicElasticity,
     J2Plasticity,
     Material,
@@ -26,7 +25,6 @@ from fenics_contact.materials import (
     PlaneStrain,
     StVenantKirchhoff,
 )
-from fenics_contact.materials.elastic import lame
 from fenics_contact.materials.hyperelastic import is_nonlinear, power_sum
 from fenics_contact.mesh import quadratic
 from tests.materials.bodies import box, in_halves
@@ -40,6 +38,7 @@ from tests.materials.deformed import (
     smooth_field,
 )
 from tests.materials.elements import whole
+from tests.materials.stretches import EXPONENTS, MODELS, MODULI, Energy, stress
 
 CELLS = ("triangle", "quadrilateral", "tetrahedron", "hexahedron", "tetrahedron10")
 RUBBER = NeoHooke(young_modulus=10.0, poisson_ratio=0.3)
@@ -150,51 +149,6 @@ def test_far_from_the_origin_the_response_is_the_same() -> None:
 
 
 # Hyperelastic models against formulas in principal stretches.
-
-#: Energy density of principal stretches.
-Energy = Callable[[np.ndarray], complex]
-LAMBDA, MU = lame(10.0, 0.3)
-EXPONENTS, MODULI = (1.3, -2.0), (2.0, -0.4)
-
-
-def volume(x: np.ndarray) -> complex:
-    return 12.0 / 2 * (x.prod() - 1) ** 2
-
-
-def neo_hooke(x: np.ndarray) -> complex:
-    log_J = np.log(x.prod())
-    return MU / 2 * ((x**2).sum() - 3 - 2 * log_J) + LAMBDA / 2 * log_J**2
-
-
-def st_venant_kirchhoff(x: np.ndarray) -> complex:
-    E = (x**2 - 1) / 2
-    return LAMBDA / 2 * E.sum() ** 2 + MU * (E**2).sum()
-
-
-def mooney_rivlin(x: np.ndarray) -> complex:
-    isochoric = (x / x.prod() ** (1 / 3)) ** 2
-    return 1.5 * (isochoric.sum() - 3) + 0.5 * ((1 / isochoric).sum() - 3) + volume(x)
-
-
-def ogden(x: np.ndarray) -> complex:
-    isochoric = x / x.prod() ** (1 / 3)
-    terms = zip(MODULI, EXPONENTS, strict=True)
-    return sum(mu / a * ((isochoric**a).sum() - 3) for mu, a in terms) + volume(x)
-
-
-MODELS: dict[str, tuple[Hyperelasticity, Energy]] = {
-    "NeoHooke": (NeoHooke(10.0, 0.3), neo_hooke),
-    "StVenantKirchhoff": (StVenantKirchhoff(10.0, 0.3), st_venant_kirchhoff),
-    "MooneyRivlin": (MooneyRivlin(1.5, 0.5, 12.0), mooney_rivlin),
-    "Ogden": (Ogden(MODULI, EXPONENTS, 12.0), ogden),
-}
-
-
-def stress(energy: Energy, stretches: np.ndarray, direction: int) -> float:
-    """First Piola-Kirchhoff stress along a principal direction, by a complex step."""
-    ahead = stretches.astype(complex)
-    ahead[direction] += 1e-30j
-    return float(np.imag(energy(ahead)) / 1e-30)
 
 
 def uniaxial(energy: Energy, stretch: float, dim: int) -> tuple[float, float]:

@@ -42,11 +42,10 @@ from fenics_contact.materials import (
 )
 from tests.conftest import run_on_ranks
 from tests.design import deformed_blocks
-from tests.design.test_deformed_sensitivity import PRESSURES, miss
 from tests.materials.deformed import derivative_errors, patch_of, rotation, skew_patch, smooth_field
 from tests.materials.elements import whole
 from tests.materials.sheets_on_ranks import disc_on_block
-from tests.materials.test_hyperelasticity import MODELS, Energy, stress
+from tests.materials.stretches import MODELS, Energy, stress
 
 
 @dataclass(frozen=True)
@@ -219,9 +218,12 @@ def test_shape_derivatives_of_sheets_that_press_each_other(
     monkeypatch.setattr(deformed_blocks, "RUBBER", HyperelasticPlaneStress(kind(1.0, 0.4)))
     monkeypatch.setattr(deformed_blocks, "HARDER", HyperelasticPlaneStress(NeoHooke(2.0, 0.3)))
     scene = deformed_blocks.pressed("block", 0.3, 0.1)
-    for objective in (PRESSURES, Movement("block", "x1", (1.0, 0.3))):
+    for objective in (deformed_blocks.PRESSURES, Movement("block", "x1", (1.0, 0.3))):
         problem = deformed_blocks.design_problem(scene, objective)
-        assert miss(problem, deformed_blocks.design_problem(scene, objective, tolerance=1e-12)) < 1e-6
+        assert (
+            deformed_blocks.miss(problem, deformed_blocks.design_problem(scene, objective, tolerance=1e-12))
+            < 1e-6
+        )
 
 
 @cache
@@ -299,7 +301,7 @@ def test_metal_sheets_have_consistent_tangents_loaded_and_unloaded(poisson: floa
         (lambda: HyperelasticPlaneStress(HyperelasticPlaneStress(RUBBER)), "of bodies in space"),
         (lambda: HyperelasticPlaneStress(NeoHooke(1.0, 0.49, mean_dilatation=True)), "sheets do not lock"),
         (lambda: HyperelasticPlaneStress(Fibres((0.6, 0.0, 0.8))), "turn its axes into the plane"),
-        (lambda: HistoryPlaneStress(FinitePlasticity(2e5, 0.3, 235.0)), "in small strain"),
+        (lambda: HistoryPlaneStress(FinitePlasticity(2e5, 0.3, 235.0)), "of small strain"),
         (lambda: HistoryPlaneStress(J2Plasticity(2e5, 0.3, 235.0, mean_dilatation=True)), "do not lock"),
         (lambda: Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), HyperelasticPlaneStress(RUBBER)), "dimension"),
         (
