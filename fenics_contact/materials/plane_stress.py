@@ -89,8 +89,8 @@ class HyperelasticPlaneStress(Sheet, Hyperelasticity):
             one, other = (self._sheared(axis, size) for size in (0.1, -0.1))
             if not abs(one - other) <= 1e-9 * abs(one + other):
                 raise InvalidInputError(
-                    f"a stretched sheet of {type(self.material).__name__} must not shear across its plane, but "
-                    "its energy differs by the sign of that shear: turn its axes into the plane"
+                    f"stretched sheets of {type(self.material).__name__} must not shear across their plane, "
+                    "but the energy differs by the sign of that shear: turn its axes into the plane"
                 )
 
     def _sheared(self, axis: int, size: float) -> float:
