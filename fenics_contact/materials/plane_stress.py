@@ -63,7 +63,7 @@ def is_sheet(material: object) -> bool:
 
 @dataclass(frozen=True)
 @checked()
-class HyperelasticPlaneStress(Sheet, Hyperelasticity):
+class HyperelasticPlaneStress(Sheet, Hyperelasticity):  # type: ignore[override]
     """A thin sheet of a hyperelastic material, without stress normal to it, under large deformations.
 
     The stretch λ normal to the sheet is found at each point so that ∂W/∂λ = 0. Forces are per unit of
@@ -168,7 +168,7 @@ class HyperelasticPlaneStress(Sheet, Hyperelasticity):
 
 @dataclass(frozen=True)
 @checked()
-class HistoryPlaneStress(Sheet, HistoryMaterial):
+class HistoryPlaneStress(Sheet, HistoryMaterial):  # type: ignore[override]
     """A thin sheet of a metal in small strain, without stress normal to it.
 
     The strain normal to the sheet is found at each point by Newton's method, safeguarded by bisection, with

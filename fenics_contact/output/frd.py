@@ -14,6 +14,7 @@ import numpy as np
 
 from fenics_contact._base.checks import naming_arguments
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.materials.plane_stress import is_sheet
 from fenics_contact.materials.plastic import has_history
 from fenics_contact.mesh.collapsed import by_shape
 from fenics_contact.output.files import replacing
@@ -187,7 +188,8 @@ def write_frd(path: str | Path, states: OnBodies | Sequence[OnBodies], times: Se
     digits. Stresses and strains are extrapolated from the Gauss points of each cell to its nodes and averaged
     over all cells around a node, as CalculiX does: less accurate at surfaces than
     `State.gather_nodal_stress`. FORC is `State.gather_internal_forces`. Complete quadratic cells are written
-    without their centres and the forces there, pyramids as linear hexahedra.
+    without their centres and the forces there, pyramids as linear hexahedra. With nonlinear sheets in plane
+    stress there is no TOSTRAIN: strains normal to them are not known.
 
     Args:
         path: File to write, ``.frd``; its folder is created, and a file of that name replaced when the new
@@ -216,8 +218,10 @@ def write_frd(path: str | Path, states: OnBodies | Sequence[OnBodies], times: Se
         raise InvalidInputError(f"times must have one for each of {len(several)} states, got {len(given)}")
     comm, numbering = several[0].comm, BodyNumbers.of(several[0])
     bodies = several[0].geometry.bodies
-    remembers = any(has_history(material) for body in bodies.values() for material in body.materials)
-    kinds = [kind for kind in FrdField.kinds if kind != "PE" or remembers]
+    materials = [material for body in bodies.values() for material in body.materials]
+    left_out = {"PE"} if not any(map(has_history, materials)) else set()
+    left_out |= {"TOSTRAIN"} if any(map(is_sheet, materials)) else set()
+    kinds = [kind for kind in FrdField.kinds if kind not in left_out]
     with writing(comm, Path(path), numbering.mesh, list(bodies)) as writer:
         for number, (state, time) in enumerate(zip(several, given, strict=True), start=1):
             add_on_first(comm, writer, nodal_fields(state, numbering, kinds), time, number, 1)
