@@ -11,7 +11,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 from mpi4py import MPI
 
-from benchmarks.others import large, linear, ring, warm
+from benchmarks.others import fretting, large, linear, plastic, ring, warm
 from benchmarks.others.rows import Problem, Row
 from benchmarks.study import ROOT, Records, Study, filled, found, unfilled
 from fenics_contact.output import write_json, write_text
@@ -24,8 +24,12 @@ PROBLEMS = {
     "pin": Problem("Pin in a bore, SSNV127", linear.pin_rows),
     "flat punch": Problem("Flat punch on a slab, solids4foam", linear.flat_punch_rows),
     "tube": Problem("Tube that closes a gap, SSNA105", linear.tube_rows),
+    "fretting": Problem("Fretting with bulk tension, Nowell and Hills", fretting.fretting_rows),
     "rubber": Problem("Rubber cylinder between plates, Sussman and Bathe", large.rubber_rows),
     "ring": Problem("Ring between plates, SSNP501 and SSNP502", ring.ring_rows),
+    "billet": Problem("Billet through a die, SSNV504", large.billet_rows),
+    "ball": Problem("Ball in a perfectly plastic block, SSNV506", plastic.ball_rows),
+    "sheet": Problem("Sheet stretched by a hemisphere, SSNV501", plastic.sheet_rows),
     "joint": Problem("Heat through a pressed joint, MOOSE", warm.joint_rows),
     "annulus": Problem("Heat across an annular gap, MOOSE", warm.annulus_rows),
     "gap": Problem("Gap conductance, Abaqus", warm.obstacle_rows),

@@ -9,7 +9,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fenics_contact import Limits, Scene, solve_to
+from fenics_contact import AccurateResult, Limits, Scene, solve_to
 from fenics_contact.design import Objective
 
 
@@ -80,12 +80,16 @@ def accurately(
     """Return the row of a quantity to an accuracy; `scale`: factor on it, for signs, halves and units."""
     began = process_time()
     found = solve_to(scene, objective, accuracy, MPI.COMM_SELF, limits=Limits(levels=18, unknowns=unknowns))
+    return row_of_result(found, scale, seconds=process_time() - began, **row)
+
+
+def row_of_result(found: AccurateResult[Any], scale: float = 1.0, **row: Any) -> Row:
+    """Return the row of a result."""
     return Row(
         value=scale * found.value,
         error=abs(scale) * found.error,
         unknowns=found.levels[-1].unknowns,
         products=max(level.products for level in found.levels),
-        seconds=process_time() - began,
         levels=tuple((scale * level.state_value, level.products) for level in found.levels),
         **row,
     )
