@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product, zip_longest
 from typing import Any
 
 import numpy as np
@@ -141,6 +142,7 @@ class RigidBody:
         self.name = tearing.body_names[index]
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
         body = torn.scene.bodies[self.name]
+        self._mesh, self._part = body.mesh, part
         self._points = body.mesh.points[part]
         self._modes = np.where(part[:, None, None], body.rigid_modes(), 0.0)
         supports = resisted_motions(held_components(torn.scene, self.name, self._modes))
@@ -156,6 +158,10 @@ class RigidBody:
     def held(self) -> bool:
         """Whether supports and material alone resist every motion."""
         return self.support.shape[1] == self.support.shape[0]
+
+    def has_part_of(self, surface: str | None) -> bool:
+        """Whether nodes of a surface of its body belong to it, always without a name: a tool is one part."""
+        return surface is None or bool(self._part[self._mesh.surfaces[surface]].any())
 
     def contact_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
         """Wrenches of unit normal and tangential multipliers, (n_modes, n_contact + (dim - 1) n_friction)."""
@@ -481,28 +487,34 @@ def _unresisted(torn: TornSystem, foundations: Sequence[ElasticFoundation]) -> t
 
 def _of_contact(torn: TornSystem, bodies: list[RigidBody]) -> list[sp.csc_matrix]:
     """Return the wrenches of the contact of each pair on all bodies, shape (n_wrenches, n) each."""
-    names = [body.name for body in bodies]
     normal = sp.vstack([body.contact_wrenches(torn) for body in bodies]).tocsc()
     found = []
     for number, pair in enumerate(torn.scene.contacts):
         if pair.has_friction or pair.moving:
-            found.append(_of_any(torn, pair, names))
+            found += _of_any(torn, pair, bodies)
         else:
             found.append(normal[:, np.flatnonzero(torn.points.pair == number)])
     return found
 
 
-def _of_any(torn: TornSystem, pair: ContactPair, names: list[str]) -> sp.csc_matrix:
-    """Return the wrenches of any forces between the bodies of a pair."""
+def _of_any(torn: TornSystem, pair: ContactPair, bodies: list[RigidBody]) -> list[sp.csc_matrix]:
+    """Return the wrenches of any forces between all parts of bodies that have a part of a pair's surfaces."""
     slave = torn.scene.bodies[pair.slave.body]
     at = slave.mesh.points[fixing_nodes(slave.mesh.points)]
     size = slave.rigid_modes(at).shape[2]
     length = len(at) * slave.components
-    result = np.zeros((len(names), size, length))
-    for name, sign in zip(pair.bodies, (1.0, -1.0), strict=False):
-        modes = torn.scene.bodies[name].rigid_modes(at)
-        result[names.index(name)] += sign * modes.reshape(length, size).T
-    return sp.csc_matrix(result.reshape(-1, length))
+    sides = [
+        [number for number, body in enumerate(bodies) if body.name == name and body.has_part_of(side)]
+        for name, side in zip_longest(pair.bodies, (surface.name for surface in pair.surfaces))
+    ]
+    found = []
+    for meeting in product(*sides):
+        result = np.zeros((len(bodies), size, length))
+        for number, sign in zip(meeting, (1.0, -1.0), strict=False):
+            modes = torn.scene.bodies[bodies[number].name].rigid_modes(at)
+            result[number] += sign * modes.reshape(length, size).T
+        found.append(sp.csc_matrix(result.reshape(-1, length)))
+    return found
 
 
 def _separate(motions: np.ndarray, names: list[str]) -> tuple[UnheldMotion, ...]:

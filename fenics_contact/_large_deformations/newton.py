@@ -390,7 +390,7 @@ class _Run:
             if taken is not None:
                 return taken, near, False
         try:
-            return *self._solved_whole(evaluation, near, step), True
+            return *self._solved_whole(state, near, step), True
         except InfeasibleError as reason:
             if not self._forces_known(evaluation):  # bodies at rest: nothing holds them from the start
                 raise
@@ -403,13 +403,13 @@ class _Run:
             raise NotHeldError(str(reason), reason.history) from reason
 
     def _solved_whole(
-        self, evaluation: ResidualState, near: Linearisation, step: Vector
+        self, state: _State, near: Linearisation, step: Vector
     ) -> tuple[TangentStep, Linearisation]:
         """Solve contact as a whole, with springs that exert their present forces. Collective.
 
         Where nothing else holds a tool they are as if they did not give.
         """
-        solver = self._whole(evaluation, near)
+        evaluation, solver = state.evaluation, self._whole(state, near)
         if evaluation.load.is_sprung:
             given_way = evaluation.linearised_without_springs(self.timer)
             own = step[: len(evaluation.at.multiplier)]
@@ -420,17 +420,19 @@ class _Run:
                 safe_log(_LOG.info, "springs alone hold a tool: %s", failure)
         return whole_step(near.system, evaluation.at.multiplier, step, solver), near
 
-    def _whole(self, evaluation: ResidualState, near: Linearisation) -> FaceNewton:
+    def _whole(self, state: _State, near: Linearisation) -> FaceNewton:
         """Return the solver of contact as a whole: soon given up where the load step may be cut.
 
-        So it may where forces are known, and where loads have softened the bodies.
+        So it may where forces are known, and where loads have softened the bodies. Near the end it is as
+        accurate as a face would be: bodies that have come loose are held by none.
         """
-        method = self.method
+        method, evaluation = self.method, state.evaluation
         if not self._forces_known(evaluation) and not near.system.softened:
             return FaceNewton(method.nested)
-        return FaceNewton(
-            method.nested, max_products=method.max_products, doubts=False, max_rescues=method.rescues
-        )
+        worst, wanted = evaluation.residuals.worst, method.nested
+        if worst <= method.near:
+            wanted = max(min(wanted, state.pace.forcing * worst), method.forcing * method.tolerance)
+        return FaceNewton(wanted, max_products=method.max_products, doubts=False, max_rescues=method.rescues)
 
     def _damped(self, state: _State, moved: Vector, change: Vector, turned: Vector) -> Damped[ResidualState]:
         """Return the end of a step as long as cells allow, or a better point of it. Collective.
