@@ -16,7 +16,7 @@ from _site.thumbnails import write_thumbnail
 #: The order of the gallery: what to read first. Others follow in the order of the alphabet.
 DEMOS = (
     "hertz_sphere punch_2d cattaneo_mindlin patch_test sheared_block shrink_fit press_fit_edge "
-    "bolted_joint five_links orthotropic tooth_flank chain_links snap_fit rubber_seal "
+    "bolted_joint bolted_stack five_links orthotropic tooth_flank chain_links snap_fit rubber_seal "
     "ball_imprint shallow_ironing lip_seal worn_bush power_module"
 ).split()
 #: Endings of pictures that show bodies, the best thumbnails first.

@@ -159,9 +159,9 @@ class RigidBody:
         """Whether supports and material alone resist every motion."""
         return self.support.shape[1] == self.support.shape[0]
 
-    def has_part_of(self, surface: str | None) -> bool:
-        """Whether nodes of a surface of its body belong to it, always without a name: a tool is one part."""
-        return surface is None or bool(self._part[self._mesh.surfaces[surface]].any())
+    def has_part_of(self, surface: str) -> bool:
+        """Whether nodes of a surface of its body belong to it, without a name all of them."""
+        return not surface or bool(self._part[self._mesh.surfaces[surface]].any())
 
     def contact_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
         """Wrenches of unit normal and tangential multipliers, (n_modes, n_contact + (dim - 1) n_friction)."""
@@ -505,7 +505,7 @@ def _of_any(torn: TornSystem, pair: ContactPair, bodies: list[RigidBody]) -> lis
     length = len(at) * slave.components
     sides = [
         [number for number, body in enumerate(bodies) if body.name == name and body.has_part_of(side)]
-        for name, side in zip_longest(pair.bodies, (surface.name for surface in pair.surfaces))
+        for name, side in zip_longest(pair.bodies, (each.name for each in pair.surfaces), fillvalue="")
     ]
     found = []
     for meeting in product(*sides):
