@@ -234,8 +234,9 @@ with show_progress(comm):
 table = {}
 for name, alpha in shapes.items():
     contact = problem.state_of(alpha).contact
-    pressure, spread = contact.pressure[contact.on_pair(0)], float(np.sqrt(values[name]))
-    table[name] = {"spread": spread, "least": float(pressure.min()), "largest": float(pressure.max())}
+    pressure = contact.pressure[contact.on_pair(0)]
+    table[name] = {"spread": float(np.sqrt(values[name]))}
+    table[name] |= {"least": float(pressure.min()), "largest": float(pressure.max())}
 
 # The tapered flange in the joint that yields, tightened in turn.
 
