@@ -16,7 +16,13 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.thickness import thickness_on
 from fenics_contact._surfaces.facets import filled_at_corners, gauss_points, within_planes
 from fenics_contact._surfaces.projection import node_weights, project
-from fenics_contact.design.motion import MeshMotion, held_by_scene, moving_with, require_movable
+from fenics_contact.design.motion import (
+    MeshMotion,
+    held_by_scene,
+    moving_with,
+    require_movable,
+    require_no_sectors,
+)
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -100,6 +106,7 @@ class WornShape:
                     "a gap by follow=np.inf"
                 )
             require_movable(scene, "a shape that follows wear")
+            require_no_sectors(scene, "a shape that follows wear")
         self._sides = [side for number, pair in enumerate(scene.contacts) for side in _Side.of(number, pair)]
         self._cut = {side.body: mirrored(scene, side.body) for side in self._sides}
         self._held = {name: held_by_scene(scene, name, cut) for name, cut in self._cut.items()}

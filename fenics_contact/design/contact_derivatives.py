@@ -402,7 +402,7 @@ def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
 
     It is ∂/∂X of −λᵀ B w − (ζ − j)ᵀ B u over the rows of ties, with the objective's derivative j by B u − c.
     Rows of bonded surfaces lie along the axes and change by the weights of the master alone, those of sliding
-    ones by its normals, too.
+    ones by its normals, too. Sides of sectors do not move.
     """
     result = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
     for rows in torn.tie_rows:
@@ -414,6 +414,8 @@ def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
         forces = np.stack([rows.along_rows(torn.gathered(x, rows)) for x in fields.multipliers])
         for index in np.unique(points.pair):
             tie, mine = torn.scene.ties[index], np.flatnonzero(points.pair == index)
+            if tie.sectors:
+                continue
             assert isinstance(tie, Tie)
             add = _add_tie if tie.discretisation == "node" else _add_mortar_tie
             add(result, torn, points, tie, motions, forces[:, mine], mine)

@@ -9,7 +9,7 @@ Integrals over a body as objectives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -307,11 +307,37 @@ def require_movable(scene: Scene, what: str) -> None:
             raise InvalidInputError(
                 f"{what} needs bodies with one shape of cells, {name!r} has {body.mesh.cells_in_words}"
             )
+
+
+def require_no_sectors(scene: Scene, what: str) -> None:
+    """Reject cyclic symmetry; `what`: needs that."""
     if scene.sectors:
         raise InvalidInputError(
             f"{what} needs scenes without cyclic symmetry, got {scene.sectors[0].place}: model all, or a "
             "sector between planes of symmetry by Roller"
         )
+
+
+def require_still_sectors(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
+    """Reject designs that move a side of a sector, or have contact that goes on around it.
+
+    `moving`: which nodes of each body move, as of `moving_nodes`.
+    """
+    touching = [side for pair in scene.contacts for side in pair.surfaces]
+    for sector in scene.sectors:
+        for side in sector.surfaces:
+            mesh = scene.bodies[side.body].mesh
+            nodes = mesh.nodes_of(side.name)
+            moved = int(np.count_nonzero(moving[side.body][nodes]))
+            own = (mesh.nodes_of(each.name) for each in touching if each.body == side.body)
+            met = sum(len(np.intersect1d(nodes, theirs)) for theirs in own)
+            if moved or met:
+                found = f"{counted(moved, 'node')} that move and {counted(met, 'node')} in contact"
+                raise InvalidInputError(
+                    f"a design needs sides of sectors that stay and do not touch, {side.name!r} of "
+                    f"{sector.place} has {found}: use a smaller transition, model the whole, or a sector "
+                    "between planes of symmetry by Roller"
+                )
 
 
 class DesignGeometry:
@@ -328,6 +354,7 @@ class DesignGeometry:
         self._bodies, self._decomposition = dict(scene.bodies), decomposition
         self.motions = [motion_of(decomposition, scene, design) for design in self.designs]
         self.moving = moving_nodes(scene, self.designs, self.motions)
+        require_still_sectors(scene, self.moving)
         self.forms = ShapeForms(decomposition.comm, np.concatenate(list(self.moving.values())))
         self._points: tuple[np.ndarray, dict[str, np.ndarray]] = (np.zeros(0), {})
         self._last: tuple[np.ndarray, dict[str, Body]] = (np.zeros(0), {})

@@ -326,5 +326,5 @@ def test_what_does_not_go_around_is_refused() -> None:
     with pytest.raises(InvalidInputError, match=message):
         solve_scene(replace(scene, bodies=rubber, loads=[Traction("upper", "z1", (0, 0, -1))]), MPI.COMM_SELF)
     design = SurfaceDesign("upper", "z1", (2, 2))
-    with pytest.raises(InvalidInputError, match="a design needs scenes without cyclic symmetry"):
+    with pytest.raises(InvalidInputError, match="a design needs sides of sectors that stay and do not touch"):
         ShapeProblem(ContactProblem(scene, MPI.COMM_SELF), design, TotalPotential())
