@@ -252,7 +252,7 @@ norm, over, idle = PressureNorm(p=24.0), 1.1**2, 0.3
 problems = {}
 for name, friction in frictions.items():
     scene = scene_of(friction, reference, over)
-    problem = ShapeProblem(ContactProblem(scene, comm, tolerance=1e-8), designs, norm)
+    problem = ShapeProblem(ContactProblem(scene, comm, tolerance=1e-10), designs, norm)
     up, down = (LoadStep(each, loads=loads(part)) for each, part in (("up", over), ("down", idle)))
     problems[name] = LoadPath(problem, [up, down]) if name != "μ = 0" else problem
 
@@ -392,4 +392,4 @@ for name in frictions:
     peaks = [table[f"{name}, {shape}"]["peak"][0] for shape in ("flat", "best arc", "ours")]
     assert peaks[0] > 2.5 * peaks[1] > 2.5 * 1.05 * peaks[2]
 assert all(abs(value / table[f"{name}, flat"]["peak"][0] - 1) < 0.01 for name, value in graded.items())
-assert max(gradients.values()) < 1e-3
+assert max(gradients.values()) < 1e-4

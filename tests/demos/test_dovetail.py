@@ -32,13 +32,14 @@ def check_peaks(more: dict[str, Any]) -> None:
     assert 0.6 < row["pressed"][1] / row["pressed"][0] < 0.7, "of 30 % of the load"
     assert row["findley"] < 0.5 * table["μ = 0.4, flat"]["findley"]
     assert max(max(counts) for counts in more["evaluations"].values()) <= 30
-    assert max(more["gradient"].values()) < 1e-3
+    assert max(more["gradient"].values()) < 1e-4
 
 
 @pytest.mark.slow
-def test_a_crown_takes_away_two_thirds_of_the_pressure_of_edges(demo: Callable[..., Any]) -> None:
-    result, output, printed = demo("dovetail", "--size", "small", timeout=500.0)
-    assert printed.count("pictures and files in") == 1
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_crown_takes_away_two_thirds_of_the_pressure_of_edges(ranks: int, demo: Callable[..., Any]) -> None:
+    result, output, printed = demo("dovetail", "--size", "small", ranks=ranks, timeout=500.0)
+    assert printed.count("pictures and files in") == 1, "one rank prints"
     pictures = {path.stem: path for path in output.glob("*.png")}
     assert set(pictures) == {"pressure_0", "pressure_1", "crown", "stress"}
     assert min(path.stat().st_size for path in pictures.values()) > 10_000
