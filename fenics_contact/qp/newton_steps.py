@@ -415,7 +415,7 @@ class FaceSteps:
             tolerance = max(tolerance, self.safeguards.rounded * before.residuals.worst)
         solved = self._solve(face, before, pressing, tolerance, predicted=not changed)
         # (d) Rigid motions, then the damped step.
-        alpha = self._motions(solved, before, step)
+        alpha = self._motions(solved, before, step, not state.faces)
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
         mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
         # Loads may not balance a start, whose residuals are then no measure: no part leads into equilibrium.
@@ -517,14 +517,30 @@ class FaceSteps:
         trial, face = solved.multiplier - step * residual, solved.system.face
         return solved.contradiction.relieved(self.problem, face, solved.multiplier, trial)
 
-    def _motions(self, solved: _SolvedFace, before: Iterate, step: Vector) -> Vector:
-        """Return α after a step: from the rows of the face, then in equilibrium. Collective."""
+    def _motions(self, solved: _SolvedFace, before: Iterate, step: Vector, first: bool) -> Vector:
+        """Return α after a step: from the rows of the face, then in equilibrium. Collective.
+
+        After the first step, a motion that opens most of what presses leaves those to it that contacts hold.
+        """
         problem, system = self.problem, solved.system
         alpha = self._fitted(system, solved.linear, solved.multiplier, solved.product, before)
-        if not self.safeguards.moves_held and system.coarse.gram.rank == problem.coarse.m:
+        held = system.coarse.gram.rank == problem.coarse.m
+        if held and not self.safeguards.moves_held:
             return alpha
         residual = solved.product - problem.rhs - problem.coarse.transpose(alpha)
-        return np.asarray(alpha + self.correction(solved.multiplier, residual, step), dtype=np.float64)
+        moved = self.correction(solved.multiplier, residual, step)
+        if held and not first and self._opens(solved, residual - problem.coarse.transpose(moved), step):
+            closed = problem.layout.normal[system.face.closed]
+            moved = self.correction(solved.multiplier, residual, step, closed)
+        return np.asarray(alpha + moved, dtype=np.float64)
+
+    def _opens(self, solved: _SolvedFace, residual: Vector, step: Vector) -> bool:
+        """Return whether a residual opens most of the contacts that press on a face. Collective."""
+        normal = self.problem.layout.normal[solved.system.face.closed]
+        force = solved.multiplier[normal]
+        opens = (force > 0.0) & (force <= step[normal] * residual[normal])
+        opening, pressing = global_sum(self.problem.comm, *map(np.count_nonzero, (opens, force > 0.0)))
+        return bool(opening > 0.5 * pressing)
 
     def _fitted(
         self,

@@ -14,6 +14,8 @@ from fenics_contact.qp.cones import FeasibleSet
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
+NO_ROWS: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+
 
 @dataclass(frozen=True, eq=False)
 class RigidMotionCorrection:
@@ -32,16 +34,23 @@ class RigidMotionCorrection:
     Newton's method with the bound that follows the trial normal force comes first. Where it does not halve
     the imbalance in every step, the bound is frozen and updated alternately; then β minimises a convex
     potential, for friction the sum of Huber functions of the slips, with global convergence. Where no motion
-    balances the load under these bounds, bodies move as on linear springs. `motions`: N, orthonormal motions
-    of bodies that no row of equality holds but those that give way, replicated; `rows`: Gᵀ N without
-    rounding; `unresisted`: motions that contact resists less than this, relative to the others, are left
-    unchanged.
+    balances the load under these bounds, bodies move as on linear springs.
+
+    Springs do not know how far others give way when a contact does, so that a flat punch on which a few
+    points press is lifted from all that they let in: half of these open again, and active sets cycle. What
+    pressed contacts hold, a face knows better; friction and springs may hold too little.
+
+    `motions`: N, orthonormal motions of bodies that no row of equality holds but those that give way,
+    replicated; `rows`: Gᵀ N without rounding; `unresisted`: motions that contact resists less than this,
+    relative to the others, are left unchanged; `held`: so are those that pressed contacts resist by more than
+    this share of all.
     """
 
     problem: DualProblem
     motions: Vector
     rows: Vector
     unresisted: float = 1e-10
+    held: float = 1e-3
 
     @classmethod
     def build(cls, problem: DualProblem) -> RigidMotionCorrection:
@@ -53,8 +62,17 @@ class RigidMotionCorrection:
         rows[np.abs(rows) <= ROUNDING * np.asarray(sizes)] = 0.0
         return cls(problem, motions, rows)
 
-    def __call__(self, multiplier: Vector, residual: Vector, step: Vector) -> Vector:
-        """Return δα = N β, shape (m,), replicated. Collective."""
+    def __call__(
+        self,
+        multiplier: Vector,
+        residual: Vector,
+        step: Vector,
+        pressed: npt.NDArray[np.int64] = NO_ROWS,
+    ) -> Vector:
+        """Return δα = N β, shape (m,), replicated. Collective.
+
+        `pressed`: owned rows of normals whose face has found motions already: those that they hold stay.
+        """
         if self.motions.shape[1] == 0:
             return np.zeros(len(self.motions))
         problem, step = self.problem, np.array(step)
@@ -63,6 +81,9 @@ class RigidMotionCorrection:
         values, vectors = np.linalg.eigh(stiffness)
         resisted = values > self.unresisted * values.max(initial=0.0)
         units = vectors[:, resisted] / np.sqrt(values[resisted])
+        rows = self.rows[pressed] @ units
+        shares, apart = np.linalg.eigh(problem.comm.allreduce(rows.T @ (step[pressed, None] * rows)))
+        units = units @ apart[:, shares <= self.held]
         springs = _Springs(
             problem,
             start=multiplier - step * residual,

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     ContactPair,
+    Pressure,
     Scene,
     Spring,
     Support,
@@ -19,8 +20,8 @@ from fenics_contact import (
     Tresca,
     solve_scene,
 )
-from fenics_contact.gallery import block
-from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.qp import DualProblem, FaceNewton, Smalse, solve
 from fenics_contact.qp.cones import CoulombLaw, Proportional, TrescaLaw
 from fenics_contact.qp.problem import NO_COMPLIANT_ROWS
@@ -173,3 +174,20 @@ def test_springs_let_a_body_come_to_rest_as_they_are():
     force = law.feasible(trial).project(trial)
     missing = correction.motions.T @ (problem.coarse.matrix @ force - problem.coarse.load)
     assert np.abs(missing).max() < 1e-6 * np.abs(problem.coarse.load).max()
+
+
+@pytest.mark.parametrize("discretisation", ["mortar", "node"])
+def test_a_flat_punch_is_not_lifted_from_what_it_presses(discretisation: str):
+    punch = rectangle((0.0, 0.0), (50.0, 100.0), (41, 41), grading=(-2.0, 0.0))
+    below = rectangle((0.0, -200.0), (100.0, 0.0), (41, 41))
+    scene = Scene(
+        {"punch": Body(punch, PlaneStrain(2.1e5, 0.3)), "below": Body(below, PlaneStrain(7e4, 0.3))},
+        [
+            Support("below", "y0", (0.0, 0.0)),
+            *(Support(body, "x0", (0.0, None)) for body in ("punch", "below")),
+        ],
+        [Pressure("punch", "y1", 100.0)],
+        [ContactPair(Surface("punch", "y0"), Surface("below", "y1"), discretisation=discretisation)],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
+    assert state.solution.products < 25  # 37 and 45 where springs lift it in every step
