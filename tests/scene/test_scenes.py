@@ -67,6 +67,8 @@ from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
     AnisotropicElasticity,
     FinitePlasticity,
+    HistoryPlaneStress,
+    HyperelasticPlaneStress,
     Hyperfoam,
     IsotropicElasticity,
     J2Plasticity,
@@ -366,6 +368,7 @@ SAMPLES: dict[type, Any] = {
         Ogden((1.0,), (2.0,), 10.0), J2Plasticity(1.0, 0.3, 0.1), FinitePlasticity(1.0, 0.3, 0.1),
         NeoHookeanPlasticity(1.0, 0.3, 0.1), Hyperfoam((1.0,), (2.0,), (0.1,)),
         RambergOsgood(1.0, 0.3, 1.0, 5.0, 0.4),
+        HyperelasticPlaneStress(NeoHooke(1.0, 0.3)), HistoryPlaneStress(J2Plasticity(1.0, 0.3, 0.1)),
     )
 }  # fmt: skip
 
