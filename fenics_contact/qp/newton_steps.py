@@ -520,7 +520,7 @@ class FaceSteps:
     def _motions(self, solved: _SolvedFace, before: Iterate, step: Vector, first: bool) -> Vector:
         """Return α after a step: from the rows of the face, then in equilibrium. Collective.
 
-        After the first step, a motion that opens most of what presses leaves those to it that contacts hold.
+        A motion that lets go of what presses leaves those to the face that contacts hold.
         """
         problem, system = self.problem, solved.system
         alpha = self._fitted(system, solved.linear, solved.multiplier, solved.product, before)
@@ -529,18 +529,22 @@ class FaceSteps:
             return alpha
         residual = solved.product - problem.rhs - problem.coarse.transpose(alpha)
         moved = self.correction(solved.multiplier, residual, step)
-        if held and not first and self._opens(solved, residual - problem.coarse.transpose(moved), step):
+        if held and self._lets_go(solved, residual - problem.coarse.transpose(moved), step, first):
             closed = problem.layout.normal[system.face.closed]
             moved = self.correction(solved.multiplier, residual, step, closed)
         return np.asarray(alpha + moved, dtype=np.float64)
 
-    def _opens(self, solved: _SolvedFace, residual: Vector, step: Vector) -> bool:
-        """Return whether a residual opens most of the contacts that press on a face. Collective."""
-        normal = self.problem.layout.normal[solved.system.face.closed]
-        force = solved.multiplier[normal]
-        opens = (force > 0.0) & (force <= step[normal] * residual[normal])
-        opening, pressing = global_sum(self.problem.comm, *map(np.count_nonzero, (opens, force > 0.0)))
-        return bool(opening > 0.5 * pressing)
+    def _lets_go(self, solved: _SolvedFace, residual: Vector, step: Vector, first: bool) -> bool:
+        """Return whether a residual leaves less than half of the contacts that press on a face. Collective.
+
+        `first`: of the first step, whose face is a guess: others may close in their place.
+        """
+        rows, force = self.problem.layout.normal, solved.multiplier
+        presses = solved.system.face.closed & (force[rows] > 0.0)
+        closes = force[rows] > step[rows] * residual[rows]
+        left = closes if first else closes & presses
+        after, pressing = global_sum(self.problem.comm, *map(np.count_nonzero, (left, presses)))
+        return bool(after < 0.5 * pressing)
 
     def _fitted(
         self,
