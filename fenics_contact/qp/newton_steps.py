@@ -415,7 +415,7 @@ class FaceSteps:
             tolerance = max(tolerance, self.safeguards.rounded * before.residuals.worst)
         solved = self._solve(face, before, pressing, tolerance, predicted=not changed)
         # (d) Rigid motions, then the damped step.
-        alpha = self._motions(solved, before, step, not state.faces)
+        alpha = self._motions(solved, state, step)
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
         mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
         # Loads may not balance a start, whose residuals are then no measure: no part leads into equilibrium.
@@ -517,32 +517,32 @@ class FaceSteps:
         trial, face = solved.multiplier - step * residual, solved.system.face
         return solved.contradiction.relieved(self.problem, face, solved.multiplier, trial)
 
-    def _motions(self, solved: _SolvedFace, before: Iterate, step: Vector, first: bool) -> Vector:
+    def _motions(self, solved: _SolvedFace, state: FaceState, step: Vector) -> Vector:
         """Return α after a step: from the rows of the face, then in equilibrium. Collective.
 
         A motion that lets go of what presses leaves those to the face that contacts hold.
         """
         problem, system = self.problem, solved.system
-        alpha = self._fitted(system, solved.linear, solved.multiplier, solved.product, before)
+        alpha = self._fitted(system, solved.linear, solved.multiplier, solved.product, state.iterate)
         held = system.coarse.gram.rank == problem.coarse.m
         if held and not self.safeguards.moves_held:
             return alpha
         residual = solved.product - problem.rhs - problem.coarse.transpose(alpha)
         moved = self.correction(solved.multiplier, residual, step)
-        if held and self._lets_go(solved, residual - problem.coarse.transpose(moved), step, first):
+        if held and self._lets_go(solved, state, residual - problem.coarse.transpose(moved), step):
             closed = problem.layout.normal[system.face.closed]
             moved = self.correction(solved.multiplier, residual, step, closed)
         return np.asarray(alpha + moved, dtype=np.float64)
 
-    def _lets_go(self, solved: _SolvedFace, residual: Vector, step: Vector, first: bool) -> bool:
+    def _lets_go(self, solved: _SolvedFace, state: FaceState, residual: Vector, step: Vector) -> bool:
         """Return whether a residual leaves less than half of the contacts that press on a face. Collective.
 
-        `first`: of the first step, whose face is a guess: others may close in their place.
+        In the first step, whose face is a guess, others may close in their place.
         """
         rows, force = self.problem.layout.normal, solved.multiplier
         presses = solved.system.face.closed & (force[rows] > 0.0)
         closes = force[rows] > step[rows] * residual[rows]
-        left = closes if first else closes & presses
+        left = closes & presses if state.faces else closes
         after, pressing = global_sum(self.problem.comm, *map(np.count_nonzero, (left, presses)))
         return bool(after < 0.5 * pressing)
 
