@@ -190,7 +190,7 @@ def whole_step(system: TangentSystem, multiplier: Vector, step: Vector, solver: 
     load = problem.coarse.load + problem.coarse.apply(multiplier)
     flexed = apply_unless_zero(problem, system.apply, multiplier)
     problem = replace(problem.with_load(problem.rhs + flexed, load), reach=unknown_reach)
-    if global_sum(problem.comm, np.count_nonzero(multiplier))[0] == 0.0:
+    if problem.norm(multiplier) == 0.0:
         # The shortest forces in equilibrium are a better start than none.
         multiplier = problem.coarse.particular()
     solution = solve(problem, None, solver, multiplier, law=torn.law)

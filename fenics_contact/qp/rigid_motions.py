@@ -77,12 +77,13 @@ class RigidMotionCorrection:
             return np.zeros(len(self.motions))
         problem, step = self.problem, np.array(step)
         step[problem.compliant.rows] = 1.0 / problem.compliant.compliance
-        stiffness = problem.comm.allreduce(self.rows.T @ (step[:, None] * self.rows))
+        held = self.rows[pressed]
+        local = self.rows.T @ (step[:, None] * self.rows), held.T @ (step[pressed, None] * held)
+        stiffness, resistance = problem.comm.allreduce(np.array(local))
         values, vectors = np.linalg.eigh(stiffness)
         resisted = values > self.unresisted * values.max(initial=0.0)
         units = vectors[:, resisted] / np.sqrt(values[resisted])
-        rows = self.rows[pressed] @ units
-        shares, apart = np.linalg.eigh(problem.comm.allreduce(rows.T @ (step[pressed, None] * rows)))
+        shares, apart = np.linalg.eigh(units.T @ resistance @ units)
         units = units @ apart[:, shares <= self.held]
         springs = _Springs(
             problem,

@@ -199,10 +199,10 @@ class QuadraturePoints:
         for number, material in enumerate(body.materials):
             mine = body.material_of_cells == number
             young, poisson = isotropic_constants(material) or (np.inf, 0.0)
-            across = strain[mine][..., 2, 2].any() or stress[mine][..., 2, 2].any()
             if is_sheet(material):
                 strain[mine, :, 2, 2] = np.nan
-            elif body.mesh.dim == 2 and not across:
+                continue
+            if body.mesh.dim == 2 and not strain[mine][..., 2, 2].any() and not stress[mine][..., 2, 2].any():
                 strain[mine, :, 2, 2] = -poisson / young * (stress[mine, :, 0, 0] + stress[mine, :, 1, 1])
         return strain
 
