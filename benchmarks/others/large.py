@@ -84,7 +84,7 @@ def rubber_rows() -> list[Row]:
         lambda state: 2e-3 * float(state.contact.normal_force.sum()), 16,
     )  # fmt: skip
     others = {200.0: "solids4foam, finite volumes 1.27"}
-    return _rows(
+    return rows_by_halving(
         path,
         {
             f"force at {way:g} mm [kN/mm]": (force, "Sussman and Bathe, off a plot", 0.1, others.get(way, ""))
@@ -153,7 +153,7 @@ def billet_rows() -> list[Row]:
         top = int(np.argmin(np.linalg.norm(points - np.array([0.0, 65.0]), axis=1)))
         return float(state.gather_displacement("billet")[top, 1])
 
-    rows = _rows(
+    rows = rows_by_halving(
         Path(billet_in_die, [LoadStep(f"{way:g} mm", supports=pushed(way)) for way in printed], lifted, 16),
         {
             f"u_z of the upper end at {way:g} mm [mm]": (
@@ -171,7 +171,7 @@ def billet_rows() -> list[Row]:
     ]
 
 
-def _rows(path: Path, known: dict[str, tuple[float, str, float, str]]) -> list[Row]:
+def rows_by_halving(path: Path, known: dict[str, tuple[float, str, float, str]]) -> list[Row]:
     """Return a row for each step, whose bar is what the last halving of the cells has changed."""
     values, unknowns, steps, seconds = path.values()
     return [

@@ -125,8 +125,7 @@ def punch_rows() -> list[Row]:
     moved = {0.0: -0.132941, 0.1: -0.130794}
     for friction in (0.0, 0.1):
         scene = punch(friction)
-        meshes = {name: quadratic(body.mesh) for name, body in scene.bodies.items()}
-        bodies = {name: replace(body, mesh=meshes[name]) for name, body in scene.bodies.items()}
+        bodies = {name: replace(body, mesh=quadratic(body.mesh)) for name, body in scene.bodies.items()}
         check = accurately(
             replace(scene, bodies=bodies), PeakPressure(0), 0.002,
             quantity=f"the same by quadratic cells, μ {friction:g} [N/mm²]",

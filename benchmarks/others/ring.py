@@ -8,7 +8,7 @@ from time import process_time
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.others.large import Path
+from benchmarks.others.large import Path, rows_by_halving
 from benchmarks.others.meshes import ring_part
 from benchmarks.others.rows import Row
 from fenics_contact import (
@@ -69,16 +69,16 @@ def force_rows(friction: float, material: Material, *, quantity: str, others: bo
     def scene(fineness: int) -> Scene:
         return ring(quadratic(quarter((fineness, 4 * fineness))), friction, material)
 
-    values, unknowns, newton, seconds = Path(scene, STEPS, force, 8).values()
-    return [
-        Row(
-            f"{quantity}, μ {friction:g}, {k + 1}/4 of the way [N/cm]", values[-1, k],
-            abs(values[-1, k] - values[-2, k]), MEASURED[k], "experiment and paper", MARGINS[friction][k],
-            f"code_aster {PRINTED[friction][k]:.3f}" if others else "", unknowns, newton, seconds / 4,
-            tuple((float(value), 0) for value in values[:, k]),
-        )
-        for k in range(4)
-    ]  # fmt: skip
+    return rows_by_halving(
+        Path(scene, STEPS, force, 8),
+        {
+            f"{quantity}, μ {friction:g}, {k + 1}/4 of the way [N/cm]": (
+                MEASURED[k], "experiment and paper", MARGINS[friction][k],
+                f"code_aster {PRINTED[friction][k]:.3f}" if others else "",
+            )
+            for k in range(4)
+        },
+    )  # fmt: skip
 
 
 def printed_row(friction: float) -> Row:
