@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -78,11 +79,7 @@ def _reference(made: Corners, finest: dict[str, Any]) -> tuple[float, float]:
 
     Quadratic cells at a corner may turn inside out where those of `solve_to` are still too large to.
     """
-    try:
-        return made.reference(**finest)
-    except ConvergenceError:
-        pass
-    try:
-        return made.reference(**finest | {"layers": 1})
-    except ConvergenceError:
-        return 0.0, np.inf
+    for coarser in ({}, {"layers": 1}):
+        with suppress(ConvergenceError):
+            return made.reference(**finest | coarser)
+    return 0.0, np.inf
