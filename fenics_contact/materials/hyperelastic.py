@@ -187,7 +187,7 @@ class Hyperelasticity(Expanding):
     ) -> tuple[Expr, Expr]:
         """Return Kirchhoff's stress λ ∂W/∂λ normal to a plane, and its derivative by ln λ (UFL scalars).
 
-        `F`: deformation gradient in the plane; `stretch`: λ normal to it.
+        F: deformation gradient in the plane; λ: stretch normal to it, `stretch`.
         """
         across = ufl.variable(stretch)
         stress = across * ufl.diff(self.energy(gradient_of_sheet(F, across), parameters), across)
