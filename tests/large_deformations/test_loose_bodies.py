@@ -18,6 +18,7 @@ from fenics_contact import (
     RigidPlane,
     Scene,
     Section,
+    State,
     Support,
     Surface,
     TotalForce,
@@ -25,6 +26,9 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact._equilibrium.static_admissibility import unresisted_motions
+from fenics_contact._large_deformations import newton
+from fenics_contact._large_deformations.equations import Linearisation
+from fenics_contact.errors import ConvergenceError
 from fenics_contact.gallery import block, bolt, drilled_plate
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity
 from fenics_contact.mesh import merge_duplicate_nodes
@@ -87,8 +91,8 @@ def plate(low: float, high: float, layers: int) -> BodyMesh:
     return BodyMesh(points, cells, {**both, "x0": number[one.surfaces["x0"]]})
 
 
-def test_a_bolt_that_nothing_draws_yet_costs_few_products() -> None:
-    """The first step starts from the shortest forces in equilibrium; from none it took 1050 products."""
+def two_bolts() -> Scene:
+    """Return two plates on a gasket with two bolts, of which one is drawn."""
     meshes = {"upper": plate(1.0, 15.0, 2), "lower": plate(-15.0, -1.0, 2)}
     bodies = {name: Body(mesh, STEEL) for name, mesh in meshes.items()}
     bodies["gasket"] = Body(plate(-1.0, 1.0, 1), IsotropicElasticity(700.0, 0.3))
@@ -100,8 +104,40 @@ def test_a_bolt_that_nothing_draws_yet_costs_few_products() -> None:
         preloads.append(Preload(name, Section((x, 0, 0), (0, 0, 1)), force))
     contacts = [ContactPair(Surface(*pair[:2]), Surface(*pair[2:]), RUBS) for pair in met]
     supports = [Support("lower", "x0"), *(Support(name, "y0", (None, 0.0, None)) for name in bodies)]
-    state = solve_scene(Scene(bodies, supports, [], contacts, preloads=preloads), MPI.COMM_SELF)
+    return Scene(bodies, supports, [], contacts, preloads=preloads)
+
+
+def whole_steps(state: State) -> int:
+    """Return how many steps but the first have solved contact as a whole."""
+    return sum(newton.WHOLE in line.note for line in state.solution.history[1:])
+
+
+def test_a_bolt_that_nothing_draws_yet_costs_few_products(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first step starts from the shortest forces in equilibrium; from none it took 1050 products.
+
+    Faces after it are wrong twice, and contact is solved as a whole; where that is in vain, the next face is
+    solved, and what was spent is counted.
+    """
+    state = solve_scene(two_bolts(), MPI.COMM_SELF)
     assert state.preloads()["drawn"].force == pytest.approx(18e3)
     assert isinstance(state, DeformedState)
     assert state.fractions == (1.0,)
     assert state.solution.products < 250
+    assert whole_steps(state) > 0
+
+    tried, solved_instead = [0], newton._Run._solved_instead
+
+    def in_vain(run: newton._Run, at: newton._State, near: Linearisation) -> newton._Solved:
+        found = solved_instead(run, at, near)
+        tried[0] += found.taken.products
+        raise ConvergenceError("no", ())
+
+    monkeypatch.setattr(newton._Run, "_solved_instead", in_vain)
+    other = solve_scene(two_bolts(), MPI.COMM_SELF)
+    assert tried[0] > 0
+    assert whole_steps(other) == 0
+    forces = other.contact.normal_force
+    assert forces == pytest.approx(state.contact.normal_force, abs=1e-6 * forces.sum())
+    monkeypatch.setattr(newton._WrongFaces, "are_many", lambda self, method: False)
+    plain = solve_scene(two_bolts(), MPI.COMM_SELF)
+    assert other.solution.products == plain.solution.products + tried[0]
