@@ -19,7 +19,6 @@
 #
 # Run it with `make demo DEMO=dovetail`, in less than a minute with `SIZE=small`.
 
-import logging
 import sys
 import time
 from pathlib import Path
@@ -60,8 +59,6 @@ from fenics_contact.design import BundleTrust, LoadPath, PressureNorm
 from fenics_contact.fatigue import Findley, assess_cycle
 from fenics_contact.mesh import quadratic, refined
 
-# First meshes of `solve_to` are coarse for peaks; it says itself how good the last one is.
-logging.getLogger("fenics_contact").setLevel(logging.ERROR)
 comm = MPI.COMM_WORLD
 output = Path("output/dovetail")
 if sys.argv[1:] not in ([], ["--size", "small"], ["--size", "full"]):
@@ -203,7 +200,8 @@ def sector():
 # ## Scenes
 #
 # `part` is the square of the speed over that of full speed. The disc's flat flanks are the slaves: blade and
-# disc slide by up to 0.1 mm on each other, and along flat slaves that opens or closes no gap.
+# disc slide by up to 0.1 mm on each other, and along flat slaves that opens or closes no gap. A warning says
+# where that is more than a facet; with the rounded flanks of the blade as slaves another one would follow.
 
 disc = sector()
 

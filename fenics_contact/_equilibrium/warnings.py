@@ -20,6 +20,7 @@ from fenics_contact._equilibrium.between_nodes import (
 )
 from fenics_contact._equilibrium.corners_inside import corner_between_nodes
 from fenics_contact._equilibrium.peaks import coarse_peak, unmatched_nodes
+from fenics_contact._equilibrium.rolling import rolling
 from fenics_contact._equilibrium.turning import Turning
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.local_axes import TILT
@@ -59,6 +60,7 @@ class Kind(Enum):
 
     SLIDING = auto()
     FACETS_SLID = auto()
+    ROLLING = auto()
     PASSING_NODES = auto()
     OPEN_MEANS = auto()
     FACETS = auto()
@@ -112,9 +114,10 @@ class ContactWarnings:
         """Warn of pairs of nonlinear materials that slide too far or are too small for cells. Collective."""
         peaks, scene, pressed_in = list[PeakUncertainty](), state.scene, _indentation(state)
         for number, pair in enumerate(scene.contacts):
-            for each in [] if scene.deforms_much else _slid_far(state, number):
-                self._log_doubt(state, each)
             deepest = float(pressed_in[state.contact.on_pair(number)].max(initial=0.0))
+            slid = _slid_far(state, number) + _rolling(state, number, deepest)
+            for each in [] if scene.deforms_much else slid:
+                self._log_doubt(state, each)
             if doubt := _between_nodes(state, number, deepest):
                 peaks.append(doubt)
                 # Load histories pass through first touches: what is pressed is named in the states alone.
@@ -172,6 +175,7 @@ class ContactWarnings:
             moved = _largest_motion(after - before, pressed_in[mine], touching)
             if moved <= computed_rounding(torn.scene.bodies[pair.slave.body].mesh.points):
                 continue  # nothing moves
+            found += _rolling(state, number, moved)
             found += _passing_nodes(state, number, moved) + _open_means(state, number, moved)
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
@@ -318,6 +322,20 @@ def _words_of_sliding(pair: ContactPair, slid: float, reach: float) -> str:
         f"reaches ({reach:.3g}), but contact points keep the place that they meet at the start: hold by a "
         "support what only the facets keep from turning or shifting, or move it in the mesh"
     )
+
+
+def _rolling(state: State, number: int, moved: float) -> list[Doubt]:
+    """Return the doubt about a pair with a rounded surface that rolls where it should slide. Collective."""
+    found, place = rolling(state, number, SHARE * moved), state.scene.contacts[number].place
+    words = (
+        f"surfaces of {place} that press slide by up to {found.slip:.3g} along each other, but with "
+        f"small strains normals stay: surface {found.surface.name!r} of {found.surface.body!r} is rounded, "
+        f"and gaps along its normals change by up to {found.gap:.2g} as if it rolled, where surfaces move "
+        f"by {moved:.2g} against each other: let the flatter surface be the slave of a pair by mortar, or "
+        "the master of one by nodes, or give one of both a material for large deformations, such as "
+        "StVenantKirchhoff, whose contact follows"
+    )
+    return [Doubt(number, Kind.ROLLING, words)] if found.gap > 0.0 else []
 
 
 def _indentation(state: State) -> np.ndarray:

@@ -30,6 +30,7 @@ from fenics_contact import (
     Tresca,
     solve_scene,
 )
+from fenics_contact._equilibrium.rolling import rolling
 from fenics_contact._fem.mechanics import HyperelasticMechanics
 from fenics_contact._large_deformations.newton import NotHeldError
 from fenics_contact._pairing.search import find_contact_points, without_rounding
@@ -517,6 +518,39 @@ def test_surfaces_that_press_and_slide_by_a_facet_of_the_master_are_told(
                 slid = "that press slide by up to 1.5 along each other, 1.5 facets of the master"
                 assert words[0].startswith(f"surfaces of high y0 on low y1 {slid}")
                 assert "a material for large deformations, such as StVenantKirchhoff" in words[0]
+
+
+@pytest.mark.parametrize("slide", [0.0, 0.5])
+@pytest.mark.parametrize("discretisation", ["mortar", "node"])
+@pytest.mark.parametrize("rounded_is_slave", [True, False])
+def test_a_rounded_surface_that_rolls_where_it_slides_is_told(
+    rounded_is_slave: bool, discretisation: Disc, slide: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    """It does where gaps are measured along its normals, and the force shows it: ½ slide² / R more depth."""
+    radius, depth, steel = 10.0, 0.05, PlaneStrain(1e3, 0.3)
+    low, high = rectangle((-4, -2), (4, 0), (48, 12)), rectangle((-3, 0), (3, 3), (48, 12))
+    x, y = high.points.T
+    high = high.moved(np.column_stack([x, y + x**2 / (2 * radius) * (1 - y / 3)]))
+    surfaces = [Surface("high", "y0"), Surface("low", "y1")][:: 1 if rounded_is_slave else -1]
+    pair = ContactPair(*surfaces, discretisation=discretisation)
+    supports = [Support("low", "y0"), Support("high", "y1", (slide, -depth))]
+    scene = Scene({"low": Body(low, steel), "high": Body(high, steel)}, supports, contacts=[pair])
+    rolls = bool(slide) and rounded_is_slave == (discretisation == "mortar")
+    words = [each for each in told(caplog, scene) if "as if it rolled" in each]
+    assert len(words) == rolls
+    if rolls:
+        assert "'y0' of 'high' is rounded, and gaps along its normals change by up to 0.012 as" in words[0]
+    force = solve_scene(scene, MPI.COMM_SELF).contact.normal_force.sum()
+    assert force == pytest.approx(29.2 if rolls else 22.0, rel=0.005)
+
+
+def test_a_shaft_that_turns_in_its_hole_rolls_nowhere() -> None:
+    """Both surfaces are curved alike: slip along them changes no gap, and curvature alone is no doubt."""
+    scene = press_fit(24, 8, interference=0.05, discretisation="mortar")
+    turn = Support("shaft", "inner", (lambda x: -0.05 * x[:, 1], lambda x: 0.05 * x[:, 0]))
+    state = solve_scene(replace(scene, supports=[Support("hub", "outer"), turn]), MPI.COMM_SELF)
+    assert np.abs(state.contact.total_slip).max() > 0.04
+    assert rolling(state, 0, 0.0).gap < 1e-3 * np.abs(state.contact.total_slip).max() ** 2
 
 
 # Bodies that touch and are not loaded: the answer is zero, at once.
