@@ -39,10 +39,6 @@ HOLD = (
 )
 
 
-#: How a step was found that solves all of contact, in the history.
-WHOLE = "contact solved as a whole"
-
-
 class NotHeldError(ConvergenceError):
     """Contact could not be solved as a whole: perhaps nothing holds some body."""
 
@@ -136,11 +132,6 @@ class TangentNewton:
             what slipped in the last one mostly goes on.
         nested: Tolerance of contact problems that are solved as a whole, at the start of a history.
         rescues: Rescues of these where the load step is cut instead: active sets that cycle come back to it.
-        wrong: Part of a step that says its face was wrong, if no longer part is as good.
-        wrong_faces: Wrong faces in a load step from which on contact is solved as a whole after each of them,
-            as where much of it opens while metals yield.
-        worthwhile: Products that this may take, relative to those of the load step so far; it is tried until
-            it fails once.
         few: Rows of gluing and supports up to which linear systems without contact are solved to `sharp`:
             there products are cheap beside a tangent, and where a body hardly resists some motion, as a bar
             the tilting of an end that a pressure pulls, a small residual hides a large error.
@@ -169,9 +160,6 @@ class TangentNewton:
     slipped: float = 1e-6
     nested: float = 1e-2
     rescues: int = 1
-    wrong: float = 0.1
-    wrong_faces: int = 2
-    worthwhile: int = 4
     few: int = 500
     sharp: float = 1e-9
 
@@ -181,16 +169,14 @@ class TangentNewton:
         Raises:
             InvalidInputError: If one is not between 0 and 1, or a count is not positive.
         """
-        ratios: tuple[str, ...] = ("tolerance", "forcing", "care", "caution", "room")
-        ratios += ("near", "least_care", "fine", "hidden", "enough", "slipped", "nested", "wrong", "sharp")
-        for name in ratios:
+        ratios = ("tolerance", "forcing", "care", "caution", "room")
+        for name in (*ratios, "near", "least_care", "fine", "hidden", "enough", "slipped", "nested", "sharp"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise InvalidInputError(
                     f"{name} of TangentNewton must lie between 0 and 1, got {getattr(self, name)!r}: it is a "
                     f"ratio, by default {getattr(TangentNewton, name)}"
                 )
-        counts = ("max_steps", "max_products", "patience", "stalls", "softening_stalls", "rescues", "few")
-        for name in (*counts, "wrong_faces", "worthwhile"):
+        for name in ("max_steps", "max_products", "patience", "stalls", "softening_stalls", "rescues", "few"):
             check_count(getattr(self, name), f"{name} of TangentNewton")
 
     def solve(
@@ -259,38 +245,6 @@ class _Begin:
     softened: int = 0
 
 
-@dataclass(frozen=True)
-class _WrongFaces:
-    """How many faces of the load step were wrong, and whether the last one was."""
-
-    count: int = 0
-    is_last: bool = False
-    in_vain: bool = False  # whether contact could not be solved as a whole instead
-
-    def after(self, method: TangentNewton, fraction: float) -> _WrongFaces:
-        """Return them after a step that was shortened to a fraction."""
-        wrong = fraction <= method.wrong
-        return replace(self, count=self.count + wrong, is_last=wrong)
-
-    def are_many(self, method: TangentNewton) -> bool:
-        """Return whether contact shall be solved as a whole next."""
-        return self.is_last and self.count >= method.wrong_faces and not self.in_vain
-
-
-@dataclass(frozen=True, eq=False)
-class _Solved:
-    """A step, with the linearisation that it solves.
-
-    `how`: words on how it was found; `floats`: whether the face does not hold every body.
-    """
-
-    taken: TangentStep
-    near: Linearisation
-    how: str
-    wrong: _WrongFaces
-    floats: bool = False
-
-
 @dataclass(frozen=True, eq=False)
 class _State:
     """The data passed from one Newton step to the next."""
@@ -302,7 +256,6 @@ class _State:
     before: Residuals | None = None  # before the last step
     instead: Configuration | None = None  # where to start from if the first step fails
     floats: bool = False  # whether the last face did not hold every body
-    wrong: _WrongFaces = _WrongFaces()
     effort: Effort = field(default_factory=Effort)
 
     @property
@@ -310,10 +263,10 @@ class _State:
         """One line for each step."""
         return self.effort.history
 
-    def after(self, line: SolverStep, solved: _Solved, wrong: _WrongFaces) -> _State:
+    def after(self, line: SolverStep, taken: TangentStep, floats: bool) -> _State:
         """Return it with another step."""
-        effort = self.effort.followed_by(Effort((line,), solved.taken.products, 1))
-        return replace(self, instead=None, floats=solved.floats, wrong=wrong, effort=effort)
+        effort = self.effort.followed_by(Effort((line,), taken.products, 1))
+        return replace(self, instead=None, floats=floats, effort=effort)
 
     def is_vain(self, method: TangentNewton) -> bool:
         """Return whether further steps are vain: residuals do not fall, or bodies lose stability meanwhile.
@@ -376,15 +329,25 @@ class _Run:
         begin = state.begin if state.history else replace(state.begin, softened=near.system.softened)
         state = replace(state, evaluation=evaluation, near=near, pace=pace, begin=begin)
         held = [f"{near.system.softened} soft motions held"] if near.system.softened else []
-        # (b), (c) The face and its linear system. (d) The step, as far as cells and the active set allow.
-        solved, damped = self._found(state, near)
+        # (b), (c) The face and its linear system.
+        with self.timer.phase("solve"):
+            taken, near, whole = self._solved(state, near)
+            change = taken.multiplier[: len(evaluation.at.multiplier)] - evaluation.at.multiplier
+            further = taken.multiplier[len(change) :]
+            moved = near.system.displacement(np.concatenate([change, further]), taken.motions)
+            change = change + evaluation.growth.passed_on(evaluation.torn, moved)
+        # (d) The step, as far as cells and the active set allow.
+        tracked = evaluation.torn.free.tracked
+        turned = taken.motions[len(taken.motions) - evaluation.torn.free.count :][:tracked]
+        damped = self._damped(state, moved, change, turned)
         # (e) The next state, or the other start if the first step has failed.
-        again, wrong = state.instead, solved.wrong.after(self.method, damped.fraction)
-        line = self._line(state, damped, solved.taken, [solved.how, *held])
+        floats, again = whole and self._forces_known(evaluation), state.instead
+        how = "contact solved as a whole" if whole else f"forcing {pace.forcing:.1e}"
+        line = self._line(state, damped, taken, [how, *held])
         if (damped.fraction == 1.0 and line.residuals.worst < evaluation.residuals.worst) or again is None:
-            state = state.after(line, solved, wrong)
+            state = state.after(line, taken, floats)
             return replace(state, evaluation=damped.point, before=evaluation.residuals)
-        state = state.after(replace(line, note=f"{line.note}, begun again"), solved, _WrongFaces())
+        state = state.after(replace(line, note=f"{line.note}, begun again"), taken, floats)
         evaluation = self._started(again, state.history)
         return replace(state, evaluation=evaluation, pace=_Pace(self.method.forcing))
 
@@ -410,53 +373,26 @@ class _Run:
         comm = evaluation.torn.numbering.comm
         return global_sum(comm, np.count_nonzero(evaluation.at.multiplier))[0] > 0.0
 
-    def _found(self, state: _State, near: Linearisation) -> tuple[_Solved, Damped[ResidualState]]:
-        """Return a step and the end of it that is taken. Collective.
-
-        Where faces were wrong it is that of contact as a whole, if that leads nearer to equilibrium.
-        """
-        if not state.wrong.are_many(self.method):
-            solved = self._solved(state, near)
-            return solved, self._damped(state, solved)
-        before = near.system.products
-        try:
-            solved = self._solved_instead(state, near)
-            damped = self._damped(state, solved)
-            if damped.point.residuals.worst < state.evaluation.residuals.worst:
-                return solved, damped
-        except (ConvergenceError, InfeasibleError) as failure:
-            safe_log(_LOG.info, "faces are wrong, and contact is not solved as a whole: %s", failure)
-        in_vain = near.system.products - before
-        solved, damped = self._found(replace(state, wrong=replace(state.wrong, in_vain=True)), near)
-        taken = replace(solved.taken, products=in_vain + solved.taken.products)
-        return replace(solved, taken=taken), damped
-
-    def _natural_step(self, state: _State, near: Linearisation) -> Vector:
-        own = state.evaluation.at.natural_step(state.pace.caution)
-        return np.concatenate([own, np.zeros(near.further.count)])
-
-    def _solved(self, state: _State, near: Linearisation) -> _Solved:
+    def _solved(self, state: _State, near: Linearisation) -> tuple[TangentStep, Linearisation, bool]:
         """Solve the face at the present point, or contact as a whole. Collective.
 
-        At the start of a history nothing is known of the active set.
+        At the start of a history nothing is known of the active set. Returns the step, the linearisation that
+        it solves, and whether it is that of contact as a whole.
         """
-        evaluation, method, wrong = state.evaluation, self.method, state.wrong
-        step, known = self._natural_step(state, near), self._forces_known(evaluation)
-        if state.history or evaluation.torn.points.count == 0 or known:
+        evaluation, method = state.evaluation, self.method
+        step = np.concatenate([evaluation.at.natural_step(state.pace.caution), np.zeros(near.further.count)])
+        if state.history or evaluation.torn.points.count == 0 or self._forces_known(evaluation):
             floor = method.fine * method.tolerance * evaluation.residuals.gluing_scale
             # What slipped in the last load step will mostly go on: its forces are at the bound.
             margin = 0.0 if state.history else method.slipped
             problem, forcing = near.problem(evaluation), state.pace.forcing
-            with self.timer.phase("solve"):
-                taken = tangent_step(problem, step, forcing, floor, method.max_products, margin=margin)
+            taken = tangent_step(problem, step, forcing, floor, method.max_products, margin=margin)
             if taken is not None:
-                return _Solved(taken, near, f"forcing {forcing:.1e}", wrong)
+                return taken, near, False
         try:
-            with self.timer.phase("solve"):
-                taken, near = self._solved_whole(state, near, step)
-            return _Solved(taken, near, WHOLE, wrong, floats=known)
+            return *self._solved_whole(state, near, step), True
         except InfeasibleError as reason:
-            if not known:  # bodies at rest: nothing holds them from the start
+            if not self._forces_known(evaluation):  # bodies at rest: nothing holds them from the start
                 raise
             raise NotHeldError(
                 f"Newton's method needs tangents that the rows of supports and contacts hold, got after "
@@ -465,15 +401,6 @@ class _Run:
             ) from reason
         except ConvergenceError as reason:
             raise NotHeldError(str(reason), reason.history) from reason
-
-    def _solved_instead(self, state: _State, near: Linearisation) -> _Solved:
-        """Solve contact as a whole in place of a face that would be wrong again. Collective."""
-        most = max(self.method.worthwhile * state.effort.products, 1)
-        solver = replace(self._whole(state, near), max_products=most)
-        with self.timer.phase("solve"):
-            at, step = state.evaluation.at, self._natural_step(state, near)
-            taken = whole_step(near.system, at.multiplier, step, solver)
-        return _Solved(taken, near, WHOLE, state.wrong)
 
     def _solved_whole(
         self, state: _State, near: Linearisation, step: Vector
@@ -507,19 +434,13 @@ class _Run:
             wanted = max(min(wanted, state.pace.forcing * worst), method.forcing * method.tolerance)
         return FaceNewton(wanted, max_products=method.max_products, doubts=False, max_rescues=method.rescues)
 
-    def _damped(self, state: _State, solved: _Solved) -> Damped[ResidualState]:
+    def _damped(self, state: _State, moved: Vector, change: Vector, turned: Vector) -> Damped[ResidualState]:
         """Return the end of a step as long as cells allow, or a better point of it. Collective.
 
         Forces out of balance are no reason for that: a step that turns a body strains it until the next one.
         """
-        start, taken = state.evaluation, solved.taken
+        start = state.evaluation
         at, caution = start.at, state.pace.caution
-        change = taken.multiplier[: len(at.multiplier)] - at.multiplier
-        further = taken.multiplier[len(change) :]
-        moved = solved.near.system.displacement(np.concatenate([change, further]), taken.motions)
-        change = change + start.growth.passed_on(start.torn, moved)
-        tracked = start.torn.free.tracked
-        turned = taken.motions[len(taken.motions) - start.torn.free.count :][:tracked]
         longest = self._room(state, moved)
 
         def after(part: float) -> ResidualState:

@@ -190,9 +190,6 @@ def whole_step(system: TangentSystem, multiplier: Vector, step: Vector, solver: 
     load = problem.coarse.load + problem.coarse.apply(multiplier)
     flexed = apply_unless_zero(problem, system.apply, multiplier)
     problem = replace(problem.with_load(problem.rhs + flexed, load), reach=unknown_reach)
-    if problem.norm(multiplier) == 0.0:
-        # The shortest forces in equilibrium are a better start than none.
-        multiplier = problem.coarse.particular()
     solution = solve(problem, None, solver, multiplier, law=torn.law)
     bound = torn.law.bound(solution.multiplier)
     face = classify(problem.layout, bound, solution.multiplier, solution.residual, step, problem.compliance)

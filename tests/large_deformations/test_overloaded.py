@@ -52,7 +52,7 @@ def test_an_overloaded_pad_gives_up_attempts_in_vain_and_reports_them(
     events = list[Event]()
     monkeypatch.setattr(progress, "LISTENERS", [events.append])
     with pytest.raises(ConvergenceError, match=r"can be followed up to 0\.\d+ of this step") as error:
-        solve_scene(pad(98.0), MPI.COMM_SELF, steps=AutomaticSteps(smallest=1.0 / 16.0))
+        solve_scene(pad(100.0), MPI.COMM_SELF, steps=AutomaticSteps(smallest=1.0 / 16.0))
     history = error.value.history
     starts = [i for i, line in enumerate(history) if line.iteration == 0] + [len(history)]
     attempts = [history[i:j] for i, j in pairwise(starts)]
