@@ -115,9 +115,9 @@ class ContactWarnings:
         peaks, scene, pressed_in = list[PeakUncertainty](), state.scene, _indentation(state)
         for number, pair in enumerate(scene.contacts):
             deepest = float(pressed_in[state.contact.on_pair(number)].max(initial=0.0))
-            slid = _slid_far(state, number) + _rolling(state, number, deepest)
-            for each in [] if scene.deforms_much else slid:
-                self._log_doubt(state, each)
+            if not scene.deforms_much:
+                for each in _slid_far(state, number) + _rolling(state, number, deepest):
+                    self._log_doubt(state, each)
             if doubt := _between_nodes(state, number, deepest):
                 peaks.append(doubt)
                 # Load histories pass through first touches: what is pressed is named in the states alone.
