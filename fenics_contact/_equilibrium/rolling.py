@@ -40,8 +40,8 @@ def rolling(state: State, number: int, least: float, loaded: float = 0.1, sharp:
     pressed = mine[contact.pressure[mine] > loaded * contact.pressure[mine].max(initial=0.0)]
     if not pair.between_bodies or pair.is_self_contact or not len(pressed):
         return nothing
-    tangents = contact.points.tangents[pressed]
-    slip = np.einsum("nk,nkd->nd", contact.total_slip[pressed][:, : tangents.shape[1]], tangents)
+    slip = np.einsum("na,nad->nd", contact.total_slip[pressed], contact.points.tangents[pressed])
+    slip = slip[:, : scene.dim]  # around an axis of revolution surfaces are alike
     if 0.5 * sharp * np.linalg.norm(slip, axis=1).max() <= least:
         return nothing
     slave, master = (surface_of(scene, side, pair.geometry) for side in pair.surfaces)

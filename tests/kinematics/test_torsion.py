@@ -44,6 +44,7 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact import _cli as cli
+from fenics_contact._equilibrium.rolling import rolling
 from fenics_contact.design import StrainEnergy
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
@@ -53,6 +54,7 @@ from fenics_contact.output import read_result, write_contact_table
 from fenics_contact.pictures import plot_contact_pressure, plot_stress
 from fenics_contact.pictures.curves import contact_trace
 from fenics_contact.results.linear_state import as_linear
+from tests.equilibrium.press_fits import Disc
 from tests.kinematics.revolved import (
     BORE,
     INTERFERENCE,
@@ -596,3 +598,14 @@ def test_pressure_of_a_fit_does_not_depend_on_its_torque() -> None:
         solved(twisted_fit("quadrilateral", 4, "node", turn), 1e-9).contact.pressure for turn in (0.0, 3e-3)
     ]
     np.testing.assert_allclose(*pressures, rtol=1e-6)
+
+
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+def test_bodies_that_slide_around_the_axis_roll_nowhere(discretisation: Disc) -> None:
+    """Surfaces are alike around the axis: slip far larger than the approach changes no gap."""
+    scene = stacked("quadrilateral", discretisation, (3, 2))
+    upper = max(scene.bodies, key=lambda name: scene.bodies[name].mesh.points[:, 1].max())
+    turned = Support(upper, "y1", (None, None, lambda x: 0.1 * x[:, 0]))
+    state = solved(with_torsion(scene, turned))
+    assert np.abs(state.contact.total_slip[:, 1]).max() > 100 * np.abs(state.contact.gap).max()
+    assert rolling(state, 0, 0.0).gap == 0.0
